@@ -13,6 +13,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from bh.errors import InputError
 from bh.runtime.terminal import say
 from bh.studio.desk import Desk
@@ -35,6 +37,7 @@ class Run:
         spent: s in all after opening.
         triangles: of its mesh.
         note: why it is not there, or an empty string.
+        share: of the way that its creases have gone, percent.
     """
 
     opened: float
@@ -42,6 +45,7 @@ class Run:
     spent: float
     triangles: int
     note: str
+    share: float = 0.0
 
 
 def run(file: Path) -> Run:
@@ -70,7 +74,10 @@ def run(file: Path) -> Run:
         slowest = max(slowest, time.process_time() - before)
     frame = desk.frame
     note = "" if frame.at_rest else frame.note or f"not at rest after {LONGEST:.0f} s"
-    return Run(opened, slowest, spent, len(desk.session.mesh.triangles), note)
+    full = desk.sheet.full
+    gone = [angle / full[name] for name, angle in frame.controls.folds.items()]
+    share = 100.0 * float(np.mean(gone)) if gone else 0.0
+    return Run(opened, slowest, spent, len(desk.session.mesh.triangles), note, share)
 
 
 def main() -> None:
@@ -89,7 +96,7 @@ def main() -> None:
         state = found.note or ("STALL" if found.slowest > STALL else "there")
         say(
             f"{file.relative_to(folder)}: {found.triangles} triangles, opened {found.opened:.1f} s, "
-            f"slowest {found.slowest:.2f} s, {found.spent:.1f} s in all: {state}"
+            f"slowest {found.slowest:.2f} s, {found.spent:.1f} s in all, {found.share:.0f} %: {state}"
         )
     there = [each for each in runs.values() if not each.note]
     calm = [each for each in there if each.slowest <= STALL]

@@ -3,15 +3,23 @@
 The command runs in a process of its own, and who asks is a socket in place of a browser, which has to start besides.
 The slider goes to 30 % as soon as the sheet is there; the picture is that in equilibrium with it. Seconds of the
 processor are those of the command, which a busy machine hardly changes.
+
+With `--browser` the command opens the browser of this machine itself, in a new profile and without a graphics card,
+and the picture is one that was drawn in its page; the processor's seconds are those of both then. The page's times,
+counted from its first byte, are told besides: sheet, and flat and folded picture.
 """
 
 from __future__ import annotations
 
+import argparse
 import asyncio
+import importlib
 import json
+import os
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -20,8 +28,10 @@ import tornado.httpclient
 import tornado.websocket
 
 from bh.runtime.terminal import say
+from tests.unit.browsers import OPTIONS, PROGRAM
 
 RUNS = 5
+PATIENCE = 60.0  # s
 BH = Path(sys.executable).with_name("bh")
 PERCENT = 30.0
 
@@ -67,6 +77,68 @@ def start(file: str) -> tuple[float, float]:
     return wall, _processor() - before
 
 
+FOLDS = """() => {
+  const s = window.studio;
+  if (!s?.head) return null;
+  window.times ??= { sheet: performance.now() };
+  const slider = document.getElementById("percent");
+  if (slider.value === "0") {
+    slider.value = PERCENT; slider.dispatchEvent(new Event("input", { bubbles: true }));
+  }
+  if (s.rest && Object.values(s.head.asked).some((angle) => angle !== 0)) {
+    return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(performance.now()))));
+  }
+  return null;
+}""".replace("PERCENT", str(PERCENT))
+
+
+def seen(file: str) -> tuple[float, float]:
+    """Seconds from the command to the folded picture in a browser that it opens, and those of the processor of both.
+
+    Args:
+        file: a drawing, or a pattern of the library.
+    """
+    from playwright.sync_api import Error, sync_playwright
+
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, sync_playwright() as driver:
+        words = [
+            *(str(PROGRAM), *OPTIONS, "--no-sandbox", "--headless=new", "--no-first-run"),
+            *("--remote-debugging-port=0", f"--user-data-dir={profile}", "%s", "&"),
+        ]
+        port = Path(profile, "DevToolsActivePort")
+        began = time.perf_counter()
+        process = subprocess.Popen(
+            [str(BH), "studio", file],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "BROWSER": " ".join(words)},
+        )
+        try:
+            while not (port.exists() and port.read_text()):
+                time.sleep(0.01)
+            chromium = driver.chromium.connect_over_cdp(f"http://127.0.0.1:{port.read_text().split()[0]}")
+            page = chromium.contexts[0].pages[0]
+            drawn = None
+            while drawn is None:
+                if time.perf_counter() - began > PATIENCE:
+                    raise TimeoutError(f"there is no folded picture of '{file}' after {PATIENCE:.0f} s")
+                try:
+                    drawn = page.evaluate(FOLDS)
+                except Error:  # the page is not there yet
+                    time.sleep(0.01)
+            wall = time.perf_counter() - began
+            say(
+                f"the page had the sheet at {page.evaluate('times.sheet'):.0f} ms, its picture at {drawn:.0f} ms"
+            )
+            me = importlib.import_module("psutil").Process(process.pid)  # it has no types
+            spent = sum(sum(each.cpu_times()[:2]) for each in (me, *me.children(recursive=True)))
+            chromium.new_browser_cdp_session().send("Browser.close")
+        finally:
+            process.kill()
+            process.wait()
+    return wall, spent
+
+
 def _processor() -> float:
     """Seconds that children have had of the processor."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -75,8 +147,12 @@ def _processor() -> float:
 
 def main() -> None:
     """Print a line a file."""
-    for file in sys.argv[1:] or ["examples/wave.svg"]:
-        times = np.array([start(file) for _ in range(RUNS)])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("files", nargs="*", default=["examples/wave.svg"])
+    parser.add_argument("--browser", action="store_true", help="open one, and look at its page")
+    given = parser.parse_args()
+    for file in given.files:
+        times = np.array([(seen if given.browser else start)(file) for _ in range(RUNS)])
         (wall, cpu), (least, _) = np.median(times, axis=0), times.min(axis=0)
         say(f"{file}: median {wall:.1f} s (least {least:.1f} s), {cpu:.1f} s of the processor")
 

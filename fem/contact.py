@@ -43,23 +43,24 @@ class StoppedShell(InTheWay):
     contact_blocks: ContactBlocks | None = None
     _here: Here | None = None
 
-    def hinder(self, model: Model, x: Array) -> None:
+    def hinder(self, model: Model, x: Array, pressed: bool) -> None:
         """Let panels stop each other if a model asks for it, from where the step begins.
 
         Args:
             model: of the sheet.
             x: (n, 3) positions of all nodes, mm.
+            pressed: bars press in the step.
 
         Raises:
             ModelError: contact does not fit the sheet, or the step begins with a sheet that meets itself.
         """
+        if model.rubs and (pressed or model.stops_itself):
+            raise ModelError("the shell knows no friction; take formulation consistent or bars-and-hinges")
         if not model.stops_itself:
             return
         from bh.mechanics.contact.barrier import sheet_barrier
         from bh.mechanics.contact.blocks import ContactBlocks
 
-        if model.rubs:
-            raise ModelError("the shell knows no friction; take formulation consistent or bars-and-hinges")
         if model.contact == "thickness" and any(zone.sheet.t != model.sheet.t for zone in model.zones):
             raise ModelError("contact = thickness: zones have another thickness; give a gap in mm")
         self.barrier = sheet_barrier(Model(self.mesh.linear, model.sheet, contact=model.contact))
@@ -92,6 +93,15 @@ class StoppedShell(InTheWay):
                 yield
         finally:
             self._here = None
+
+    def harden(self, factor: float) -> None:
+        """Let panels press by a number of times what the model asks for, until told otherwise.
+
+        Args:
+            factor: 1 for the model's own.
+        """
+        self._here = None  # what is remembered there was pressed otherwise
+        super().harden(factor)
 
     def meetings(self, x: Array) -> str:
         """Which parts of the sheet meet or lie too near, in words; empty where it is clear.

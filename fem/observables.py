@@ -83,6 +83,7 @@ def observe(
         },
         reactions=_to_corners(system, system.components.to_global(reactions)),
         crease_moments=_crease_moments(system, couples),
+        contact_forces={} if system.outside is None else system.outside.bar_forces(here.x, lam),
         stable=stable,
         nodes=here.x,
         frames=system.carried_frames(here.components),

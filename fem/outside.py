@@ -1,4 +1,4 @@
-"""What acts on the shell from outside with a stiffness of its own: pressure that follows it, and ground springs.
+"""What acts on the shell from outside with a stiffness of its own: bars, pressure that follows it, ground springs.
 
 A pressure p pushes node i with the integral of p phi_i N, N = x_,1 x x_,2 of the reference triangle. Its energy is
 minus the integral of p u . int_0^1 N(X + s u) ds, the work on the straight way from the flat sheet, which is the
@@ -19,12 +19,13 @@ from skfem.refdom import RefLine, RefTri
 
 from bh.errors import ModelError
 from bh.loading.load_step import LoadStep
-from bh.model.actuations import Tether
+from bh.model.actuations import Indenter, Tether
 from bh.model.constraints import Constraints
 from bh.model.ramp import Ramp
 from bh.model.springs import GroundSpring, ground_stiffness
 from bh.solvers.factor import Matrix
 from bh.solvers.follower import FollowerMatrix
+from fem.bars import BarsOnShell
 from fem.components import Components
 from fem.shell import ShellElements
 from fem.spaces import SLOPES, barycentric, gradients, shapes
@@ -36,7 +37,7 @@ NOTHING = 1e-9  # part of the largest possible entry of a skew tangent
 
 @dataclass(frozen=True, eq=False)
 class ShellOutside:
-    """Pressure and springs of one step; positions x are (n, 3) of all nodes, mm.
+    """Bars, pressure and springs of one step; positions x are (n, 3) of all nodes, mm.
 
     Attributes:
         elements: of the sheet.
@@ -44,6 +45,7 @@ class ShellOutside:
         ground: (n, 3) stiffness of springs at all nodes, N / mm.
         tether: (n, 3) stiffness of springs that are at rest where the step begins, N / mm; None without.
         begin: (n, 3) positions there, mm.
+        bars: rigid bars that press; None without.
     """
 
     elements: ShellElements
@@ -51,6 +53,7 @@ class ShellOutside:
     ground: Array
     tether: Array | None = None
     begin: Array | None = None
+    bars: BarsOnShell | None = None
 
     @cached_property
     def _stiff(self) -> Array:
@@ -65,13 +68,15 @@ class ShellOutside:
         return np.asarray(out + self.tether * (x - self.begin))
 
     def energy(self, x: Array, lam: float) -> float:
-        """Energy of both, N mm.
+        """Energy of all, N mm.
 
         Args:
             x: (n, 3) positions, mm.
             lam: load parameter of the step, 0 to 1.
         """
         out = self.spring_energy(x)
+        if self.bars is not None:
+            out += self.bars.energy(x, lam)
         if self.tether is not None and self.begin is not None:
             out += 0.5 * float(np.vdot(self.tether, (x - self.begin) ** 2))
         return out if self.pressure is None else out - float(self.pressure.at(lam) @ self._swept(x))
@@ -81,24 +86,58 @@ class ShellOutside:
         return 0.5 * float(np.vdot(self.ground, (x - self.elements.mesh.nodes) ** 2))
 
     def gradient(self, x: Array, lam: float) -> Array:
-        """(n, 3) forces against both, N: of springs less those of the pressure.
+        """(n, 3) forces against all, N: of springs less those of bars and pressure.
 
         Args:
             x: (n, 3) positions, mm.
             lam: load parameter of the step, 0 to 1.
         """
         out = self._held(x)
+        if self.bars is not None:
+            out = out + self.bars.gradient(x, lam)
         return out if self.pressure is None else out - self._pushes(*self._tangents(x), self.pressure.at(lam))
 
-    def push_rate(self, x: Array) -> Array:
-        """(n, 3) rate of the forces of the pressure with lambda at fixed positions x (n, 3), N."""
-        if self.pressure is None:
-            return np.zeros_like(x)
-        return self._pushes(*self._tangents(x), self.pressure.rate)
+    def push_rate(self, x: Array, lam: float) -> Array:
+        """(n, 3) rate of the forces of bars and pressure with lambda at fixed positions, N.
 
-    def power(self, x: Array) -> float:
-        """Rate of the energy with lambda at fixed positions x (n, 3), N mm."""
-        return 0.0 if self.pressure is None else -float(self.pressure.rate @ self._swept(x))
+        Args:
+            x: (n, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
+        out = np.zeros_like(x)
+        if self.bars is not None:
+            out -= self.bars.times(x, out, lam, 1.0)
+        if self.pressure is not None:
+            out += self._pushes(*self._tangents(x), self.pressure.rate)
+        return out
+
+    def power(self, x: Array, lam: float) -> float:
+        """Rate of the energy with lambda at fixed positions, N mm.
+
+        Args:
+            x: (n, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
+        total = 0.0 if self.bars is None else self.bars.power(x, lam)
+        return total if self.pressure is None else total - float(self.pressure.rate @ self._swept(x))
+
+    def second(self, x: Array, lam: float) -> float:
+        """Second derivative of the energy by lambda at fixed positions, N mm.
+
+        Args:
+            x: (n, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
+        return 0.0 if self.bars is None else self.bars.second(x, lam)
+
+    def bar_forces(self, x: Array, lam: float) -> dict[str, Array]:
+        """(3,) force of every bar on the sheet, N, by its name.
+
+        Args:
+            x: (n, 3) positions, mm.
+            lam: load parameter of the step, 0 to 1.
+        """
+        return {} if self.bars is None else self.bars.forces(x, lam)
 
     def times(self, x: Array, v: Array, lam: float) -> Array:
         """(n, 3) rate of the gradient for velocities v (n, 3).
@@ -109,6 +148,8 @@ class ShellOutside:
             lam: load parameter of the step, 0 to 1.
         """
         out = self._stiff * v
+        if self.bars is not None:
+            out += self.bars.times(x, v, lam)
         if self.pressure is None:
             return out
         (a, b), (da, db), p = self._tangents(x), self._tangents(v), self.pressure.at(lam)
@@ -126,6 +167,8 @@ class ShellOutside:
         owner, place = self._owners
         for axis in range(3):
             K[owner, 3 * place + axis, 3 * place + axis] += self._stiff[:, axis]
+        if self.bars is not None:
+            self.bars.add(K, x, lam)
         if self.pressure is None:
             return
         phi, slope, weight = self._rule
@@ -305,16 +348,20 @@ def shell_outside(
     tethers = [
         GroundSpring(item.at, total=item.total) for item in load_step.bodies if isinstance(item, Tether)
     ]
-    if len(tethers) < len(load_step.bodies):
-        raise ModelError("the shell knows no bars and pulls; take formulation consistent or bars-and-hinges")
+    bars = tuple(item for item in load_step.bodies if isinstance(item, Indenter))
+    if len(tethers) + len(bars) < len(load_step.bodies):
+        raise ModelError(
+            "the shell knows no moulds and pulls; take formulation consistent or bars-and-hinges"
+        )
     if constraints.rigid_body and load_step.pressure is not None:
         raise ModelError("a pressure pushes a sheet that nothing holds as a whole; add supports or springs")
-    if load_step.pressure is None and ground is None and not tethers:
+    if load_step.pressure is None and ground is None and not load_step.bodies:
         return None
     mesh = elements.mesh
     ground = np.zeros_like(mesh.nodes) if ground is None else ground
     tether = ground_stiffness(tethers, mesh.linear) if tethers else None
-    return ShellOutside(elements, load_step.pressure, ground, tether, begin)
+    pressing = BarsOnShell(mesh, bars) if bars else None
+    return ShellOutside(elements, load_step.pressure, ground, tether, begin, pressing)
 
 
 def _cross(v: Array) -> Array:

@@ -85,7 +85,7 @@ class ShellSystem(StoppedShell, CreaseMemory):
         self.outside = shell_outside(elements, load_step, loads.ground(elements, model), self.constraints, x)
         self.load = self._loads(model, step, moments)
         self._here: Here | None = None
-        self.hinder(model, x)
+        self.hinder(model, x, self.outside is not None and self.outside.bars is not None)
         self.tethers = NONE
         if load_step.releases and start is not None:
             pull = self.gradient(self.at(self.start(), 0.0))[self.components.free]
@@ -321,7 +321,7 @@ class ShellSystem(StoppedShell, CreaseMemory):
         beta = self.components.beta(here.components)
         out[self.components.first_beta :] += self.creases.gradient_rate(beta, lam).ravel()
         if self.outside is not None:
-            self._add_nodal(out, -self.outside.push_rate(here.x))
+            self._add_nodal(out, -self.outside.push_rate(here.x, lam))
         if self.rest is not None:
             out -= self.components.spread(
                 np.einsum("tkj,tk->tj", here.B, self.elements.forces(*self.rest.rate))
@@ -332,7 +332,7 @@ class ShellSystem(StoppedShell, CreaseMemory):
         """Derivative of the potential by lambda at fixed q, N mm."""
         here = self.at(q, lam)
         total = float(self.gradient(here) @ self.components.rate) - float(self.load.rate @ here.components)
-        total += 0.0 if self.outside is None else self.outside.power(here.x)
+        total += 0.0 if self.outside is None else self.outside.power(here.x, lam)
         total += self.tethers.power(q, lam)
         if self.rest is not None:
             total -= float(np.vdot(here.forces, np.hstack(self.rest.rate)))
@@ -346,7 +346,8 @@ class ShellSystem(StoppedShell, CreaseMemory):
         total += float(self._times(here, self.components.rate) @ self.components.rate)
         if self.outside is not None:
             moves = self.components.moves(self.components.rate)
-            total -= 2.0 * float(np.vdot(self.outside.push_rate(here.x), moves))
+            total -= 2.0 * float(np.vdot(self.outside.push_rate(here.x, lam), moves))
+            total += self.outside.second(here.x, lam)
         total -= 2.0 * float(self.load.rate @ self.components.rate)
         if self.rest is not None:
             forces, here = self.elements.forces(*self.rest.rate), self.at(q, lam)

@@ -16,6 +16,7 @@ from meshes.errors import MeshError
 from meshes.fans import pieces
 from meshes.pattern import FOLD_KINDS, CreasePattern, FoldKind
 from meshes.topology import Ints, Topology, build
+from meshes.wide import SIDES, STRIP
 
 
 def count(number: int, what: str) -> str:
@@ -130,7 +131,7 @@ class SheetMesh:
     def __repr__(self) -> str:
         """One line: "SheetMesh(451 nodes, 640 triangles, 1 crease, staggered, aspect ratio 8.1)"."""
         words = [count(len(self.points), "node"), count(len(self.triangles), "triangle")]
-        words += [count(len(self.creases), "crease"), self.kind]
+        words += [count(len(self.drawn_creases), "crease"), self.kind]
         if self.aspect_ratio == self.aspect_ratio:
             words.append(f"aspect ratio {self.aspect_ratio:.3g}")
         return f"SheetMesh({', '.join(words)})"
@@ -209,6 +210,22 @@ class SheetMesh:
         """Names of the creases, without "crease:"."""
         return tuple(name.removeprefix("crease:") for name in self.edge_sets if name.startswith("crease:"))
 
+    @property
+    def wide_creases(self) -> tuple[str, ...]:
+        """Names of the wide creases (`meshes.wide_creases`), without "strip:"."""
+        return tuple(name.removeprefix(STRIP) for name in self.edge_sets if name.startswith(STRIP))
+
+    @property
+    def side_of(self) -> dict[str, str]:
+        """The two lines of every wide crease, and the crease that they are of."""
+        return {f"{name}-{side}": name for name in self.wide_creases for side in SIDES}
+
+    @property
+    def drawn_creases(self) -> tuple[str, ...]:
+        """Names of the creases as they were drawn: wide ones by their own name in place of their two lines."""
+        sides = self.side_of
+        return tuple(dict.fromkeys(sides.get(name, name) for name in self.creases))
+
     def nodes(self, at: str) -> Ints:
         """Nodes of a place: "corner:inner-start", "edge:inner", "crease:NAME", "node:N", "near:X,Y" or "all".
 
@@ -262,10 +279,11 @@ class SheetMesh:
         pairs = self.edge_sets.get(f"crease:{crease}")
         if pairs is None and f"strip:{crease}" in self.edge_sets:
             raise MeshError(
-                f"crease '{crease}' is a strip, not a line: fold it by its rest angle, or hold or push the panels"
+                f"crease '{crease}' has a width, so it is a strip, not a line: fold it by rest alone, say how stiff it "
+                "is where its width is told, and hold or push the panels beside it"
             )
         if pairs is None:
-            names = ", ".join(self.creases) or "none (the sheet has no crease)"
+            names = ", ".join(self.drawn_creases) or "none (the sheet has no crease)"
             raise MeshError(f"the sheet has no crease '{crease}'; its creases: {names}")
         return pairs
 

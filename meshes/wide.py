@@ -19,6 +19,7 @@ from meshes.quantities import Typed, number
 
 STRIP = "strip:"  # a place that has both lines of a wide crease
 SIDES = ("left", "right")  # of a crease, as it runs
+WIDE = "wide crease"  # what the two lines are called where they are drawn
 NEAR = 1e-6  # of the sheet's size: an end on the outline
 
 
@@ -197,12 +198,18 @@ def _check_apart(
             strips[name] = shapely.Polygon(np.vstack((one, two[::-1])))
         if not sheet.covers(strips[name]):
             raise _off_the_sheet(name, widths[name])
+    wide = {
+        member.replace(":", " '") + "'": f"crease '{group.removeprefix(STRIP)}', which is wide, too"
+        for group, members in pattern.groups
+        if group.startswith(STRIP)
+        for member in members
+    }
     for name, strip in strips.items():
         for what, line in lines.items():
             if what != f"crease '{name}'" and strip.intersects(strips.get(what[8:-1], line)):
                 raise PatternError(
-                    f"crease '{name}' is {widths[name]:g} mm wide and meets {what}; only creases that keep away from "
-                    "others can be wide: make it narrower, or leave out its width"
+                    f"crease '{name}' is {widths[name]:g} mm wide and meets {wide.get(what, what)}; only creases that "
+                    "keep away from others can be wide: make it narrower, or leave out its width"
                 )
 
 

@@ -14,21 +14,17 @@ import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
 from meshes.errors import InputError
+from reports import drawing
+from reports.drawing import HEIGHT, WIDTH
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-WIDTH, HEIGHT = 420, 300  # of a plot, CSS pixels where it is not scaled
 MOST_MARKERS = 40  # points of a curve that are all marked
 WIDEST = 1600  # of a picture, pixels
-# stand-ins for the CSS variables while matplotlib draws; no two may be equal
-INK, SOFT, RULE = "#010203", "#010204", "#010205"
-SERIES = tuple(f"#0a0b{number:02x}" for number in range(1, 9))
+FLAT, SAME = 0.005, 1e-12  # of the largest value: rounding is not to look like a trend
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 REFERENCE_DASHES = ("4,3", "1.2,1.8", "8,2.5", "8,2,1.2,2")
 DASHES = ("none", "5,1.6", "1.4,1.4", "6,1.6,1.4,1.6", "9,2.5", "3,1.4", "8,1.6,1.4,1.6,1.4,1.6", "2.5,3")
@@ -89,35 +85,21 @@ def svg(plot: Plot, prefix: str) -> str:
     Raises:
         ReportError: a series has not as many x as y.
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
     prefix = re.sub(r"[^\w-]", "-", prefix)  # what a file of results calls a plot is part of it
-
-    settings: Any = {
-        "svg.fonttype": "none",
-        "svg.hashsalt": prefix,
-        "font.size": 12.0,
-        "text.color": INK,
-        "axes.edgecolor": SOFT,
-        "axes.labelcolor": INK,
-        "axes.linewidth": 0.8,
-        "xtick.color": SOFT,
-        "ytick.color": SOFT,
-        "grid.color": RULE,
-        "xtick.labelcolor": INK,
-        "ytick.labelcolor": INK,
-        "text.parse_math": False,
-        "axes.unicode_minus": True,
-    }
-    with rc_context(settings):
-        figure = Figure(figsize=(WIDTH / 72.0, HEIGHT / 72.0), layout="constrained")
-        axes = figure.subplots()
-        _draw(axes, plot)
-        sink = io.StringIO()
-        nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-        figure.savefig(sink, format="svg", transparent=True, metadata=nothing)
-    return _inline(sink.getvalue(), plot, prefix)
+    dressed = plot.dressed()
+    for _, _, series in dressed:
+        if len(series.x) != len(series.y):
+            raise ReportError(
+                f"plot '{plot.id}', series '{series.label}': {len(series.x)} x for {len(series.y)} y; give pairs"
+            )
+    body = drawing.drawn(_scale(plot, "x", SAME), _scale(plot, "y", FLAT), _curves(plot), f"{prefix}c")
+    named = ", ".join(series.label for series in plot.series)
+    what = typeset(f"{plot.y.label} against {plot.x.label}" + (f": {named}" if named else ""))
+    return (
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" stroke-linejoin="round" role="img" '
+        f'aria-labelledby="{prefix}t {prefix}d"><title id="{prefix}t">{escape(typeset(plot.title))}</title>'
+        f'<desc id="{prefix}d">{escape(what)}</desc>{body}</svg>'
+    )
 
 
 def with_prefix(drawn: str, prefix: str) -> str:
@@ -181,41 +163,26 @@ def picture_link(file: Path) -> tuple[str, int, int]:
 # --- drawing --------------------------------------------------------------------------------------------------
 
 
-def _draw(axes: Axes, plot: Plot) -> None:
+def _curves(plot: Plot) -> list[drawing.Curve]:
+    """The series, references beneath the others, of which the first are the widest: each shows beneath the next."""
     dressed = plot.dressed()
     last = max((number for number, _, _ in dressed), default=0)
-    for number, dash, series in dressed:
-        if len(series.x) != len(series.y):
-            raise ReportError(
-                f"plot '{plot.id}', series '{series.label}': {len(series.x)} x for {len(series.y)} y; give pairs"
-            )
+    found = []
+    for number, dash, series in sorted(dressed, key=lambda item: item[0] >= 0):
         x, y = _values(series.x, plot.x.log), _values(series.y, plot.y.log)
-        pattern: Any = "-" if dash == "none" else (0, tuple(float(part) for part in dash.split(",")))
         if number < 0:
-            axes.plot(x, y, color=SOFT, linewidth=1.3, linestyle=pattern, zorder=1.5)
+            found.append(drawing.Curve(x, y, "var(--soft)", 1.3, dash))
             continue
-        look: dict[str, Any] = {"color": SERIES[number], "marker": MARKERS[number], "markeredgewidth": 0.0}
-        # the first are the widest, so that one shows beneath another that lies on it
         extra = (last - number) / max(last, 1)
+        colour, marker = f"var(--s{number + 1})", MARKERS[number]
         if series.style == "points":
-            axes.plot(x, y, linestyle="none", markersize=5.0 + 2.0 * extra, **look)
-        else:
-            size = 4.2 + 2.0 * extra
-            # a long curve has a few markers, on other places than its neighbours have theirs
-            every = None if len(x) <= MOST_MARKERS else (number * len(x) // 64, max(len(x) // 8, 1))
-            axes.plot(
-                x, y, linestyle=pattern, linewidth=1.5 + 1.5 * extra, markersize=size, markevery=every, **look
-            )
-    axes.set_xlabel(typeset(plot.x.label))
-    axes.set_ylabel(typeset(plot.y.label))
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(True, linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.tick_params(length=3.0, labelsize=11.0)
-    for axis, log, along in ((axes.xaxis, plot.x.log, "x"), (axes.yaxis, plot.y.log, "y")):
-        values = [v for s in plot.series for v in _values(getattr(s, along), log) if math.isfinite(v)]
-        if values:
-            _scale(axes, axis, along, log, min(values), max(values))
+            found.append(drawing.Curve(x, y, colour, 0.0, marker=marker, size=5.0 + 2.0 * extra))
+            continue
+        # a long curve has a few markers, on other places than its neighbours have theirs
+        every = None if len(x) <= MOST_MARKERS else (number * len(x) // 64, max(len(x) // 8, 1))
+        size = 4.2 + 2.0 * extra
+        found.append(drawing.Curve(x, y, colour, 1.5 + 1.5 * extra, dash, marker, size, every))
+    return found
 
 
 def _values(values: Sequence[float | None], log: bool) -> list[float]:
@@ -223,33 +190,10 @@ def _values(values: Sequence[float | None], log: bool) -> list[float]:
     return [math.nan if v is None or (log and v <= 0.0) else float(v) for v in values]
 
 
-def _scale(axes: Axes, axis: Any, along: str, log: bool, low: float, high: float) -> None:
-    """Scale and ticks of an axis with values from `low` to `high`."""
-    from matplotlib.ticker import (
-        FuncFormatter,
-        LogLocator,
-        MaxNLocator,
-        NullFormatter,
-        NullLocator,
-        ScalarFormatter,
-    )
-
-    if log:
-        (axes.set_xscale if along == "x" else axes.set_yscale)("log")
-    if log and high > 6.0 * low:
-        subs = (1.0, 2.0, 5.0) if high < 150.0 * low else (1.0,)
-        axis.set_major_locator(LogLocator(subs=subs, numticks=8))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
-        axis.set_minor_formatter(NullFormatter())
-        return
-    middle, span = 0.5 * (low + high), 0.005 * max(abs(low), abs(high))
-    if along == "y" and high - low < span:  # rounding is not to look like a trend
-        axes.set_ylim(middle - span, middle + span)
-    axis.set_major_locator(MaxNLocator(6))
-    axis.set_minor_locator(NullLocator())
-    formatter = ScalarFormatter(useOffset=False)
-    formatter.set_powerlimits((-5, 7))
-    axis.set_major_formatter(formatter)
+def _scale(plot: Plot, along: Literal["x", "y"], least: float) -> drawing.Scale:
+    axis = plot.x if along == "x" else plot.y
+    values = [v for s in plot.series for v in _values(getattr(s, along), axis.log) if math.isfinite(v)]
+    return drawing.scale(typeset(axis.label), axis.log, values, least, _power)
 
 
 def _power(value: float) -> str:
@@ -263,9 +207,6 @@ def _power(value: float) -> str:
 
 # --- SVG of a page --------------------------------------------------------------------------------------------
 
-_VARIABLES = {INK: "var(--ink)", SOFT: "var(--soft)", RULE: "var(--rule)"} | {
-    colour: f"var(--s{number + 1})" for number, colour in enumerate(SERIES)
-}
 _SHAPES = {
     "o": "M12 7a3 3 0 1 0 6 0a3 3 0 1 0-6 0",
     "s": "M12 4h6v6h-6z",
@@ -326,28 +267,3 @@ def superscript(number: int) -> str:
 def scientific(mantissa: str, power: int) -> str:
     """A number times a power of ten."""
     return f"{mantissa}\u2009\N{MULTIPLICATION SIGN}\u200910{superscript(power)}"
-
-
-def _inline(text: str, plot: Plot, prefix: str) -> str:
-    """The file of matplotlib as an element: no prolog, no name spaces, ids of its own, the page's colours and font."""
-    body = text[text.index("<svg") :]
-    body = body[body.index(">") + 1 :]
-    body = re.sub(r"<(metadata|style)\b.*?</\1>|<!--.*?-->", "", body, flags=re.DOTALL)
-    body = body.replace('xlink:href="#', 'href="#')
-    used = set(re.findall(r'(?:url\(|href=")#([^")]+)', body))
-    body = re.sub(
-        r' id="([^"]+)"', lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", body
-    )
-    body = body.replace("url(#", f"url(#{prefix}").replace('href="#', f'href="#{prefix}')
-    body = re.sub(r"#0[1a]0[2b]0[1-8]", lambda found: _VARIABLES[found[0]], body)
-    body = re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", body)
-    lowered = r'\1<tspan dy=".3em" font-size="75%">\2</tspan><tspan dy="-.225em">&#8203;</tspan>'
-    body = re.sub(r"(?<=>)[^<>]+(?=</text>)", lambda found: _SUBSCRIPT.sub(lowered, found[0]), body)
-    body = re.sub(r"\s*\n\s*", " ", body)
-    named = ", ".join(series.label for series in plot.series)
-    what = typeset(f"{plot.y.label} against {plot.x.label}" + (f": {named}" if named else ""))
-    return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" stroke-linejoin="round" role="img" '
-        f'aria-labelledby="{prefix}t {prefix}d"><title id="{prefix}t">{escape(typeset(plot.title))}</title>'
-        f'<desc id="{prefix}d">{escape(what)}</desc>{body}'
-    ).strip()

@@ -35,11 +35,13 @@ class Panels:
 
     Attributes:
         of_triangle: (t,) number of the panel of each triangle, from 0 in the order of the triangles.
-        creases: of each panel the creases that bound it, in the mesh's order.
+        creases: of each panel the creases that bound it, in the mesh's order; wide ones by their own name.
+        strips: numbers of those that are the strip of a wide crease.
     """
 
     of_triangle: Ints
     creases: tuple[tuple[str, ...], ...]
+    strips: frozenset[int] = frozenset()
 
     @classmethod
     def of(cls, mesh: SheetMesh) -> Panels:
@@ -68,15 +70,18 @@ class Panels:
             at = (owner >= 0) & (side >= 0)
             for panel, crease in np.unique(np.column_stack((labels[side[at]], owner[at])), axis=0).tolist():
                 bounding[panel].add(crease)
-        return cls(labels, tuple(tuple(names[k] for k in sorted(found)) for found in bounding))
+        drawn = [mesh.side_of.get(name, name) for name in names]
+        found = tuple(tuple(dict.fromkeys(drawn[k] for k in sorted(each))) for each in bounding)
+        both = (i for i, each in enumerate(bounding) if len(each) == 2 and len(found[i]) == 1)
+        return cls(labels, found, frozenset(both))
 
     def name(self, panel: int) -> str:
-        """A panel in words: "panel 2 (between crease-1 and crease-2)", "panel 0 (at crease)", "panel 0"."""
+        """A panel in words: "panel 2 (between crease-1 and crease-2)", "panel 1 (strip of crease)", "panel 0"."""
         creases = self.creases[panel]
         if not creases:
             return f"panel {panel}"
         where = (
-            f"at {creases[0]}"
+            f"{'strip of' if panel in self.strips else 'at'} {creases[0]}"
             if len(creases) == 1
             else f"between {', '.join(creases[:-1])} and {creases[-1]}"
         )

@@ -6,7 +6,8 @@
 from bh.live.controls import Controls
 from bh.live.frame import Frame
 from bh.live.grips import Grip, Jaws
+from bh.live.history import Mark
 from bh.live.holding import held
 from bh.live.session import Session
 
-__all__ = ["Controls", "Frame", "Grip", "Jaws", "Session", "held"]
+__all__ = ["Controls", "Frame", "Grip", "Jaws", "Mark", "Session", "held"]

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from bh.live.grips import Grip, Jaws
 from bh.model.actuations import Fold, Force, Pull
-from bh.model.crease_law import CreaseLaw
+from bh.model.model import Model
 from bh.model.step import Actuation
+from bh.model.wide_crease import wide_names
 
 Array = NDArray[np.float64]
 CLOSED = math.pi - 1e-3  # rad; the largest fold angle that a slider can ask for
@@ -138,11 +139,11 @@ class Way:
         off = float(np.abs(change - lam * along).max())
         return lam if off <= PARALLEL * max(float(np.abs(change).max()), float(np.abs(along).max())) else None
 
-    def actuations(self, laws: Mapping[str, CreaseLaw], gone: tuple[int, ...] = ()) -> tuple[Actuation, ...]:
+    def actuations(self, model: Model, gone: tuple[int, ...] = ()) -> tuple[Actuation, ...]:
         """What brings the end about.
 
         Args:
-            laws: creases that are springs; their rest angles turn. All others are imposed.
+            model: whose creases they are.
             gone: nodes that were let go of: what still pulls there fades out.
 
         Returns:
@@ -150,7 +151,7 @@ class Way:
         """
         items: list[Actuation] = []
         for crease, angle in self.end.folds.items():
-            items.append(fold_of(crease, angle, laws.get(crease)))
+            items.append(fold_of(model, crease, angle))
         items += [Force([node], each=(0.0, 0.0, 0.0)) for node in gone]
         items += [
             Pull(node, grip.to, grip.stiffness, self.start.grips[node].to)
@@ -159,14 +160,17 @@ class Way:
         return tuple(items)
 
 
-def fold_of(crease: str, angle: float, law: CreaseLaw | None) -> Fold:
-    """The fold of a crease to an angle: imposed, or the rest angle of its spring.
+def fold_of(model: Model, crease: str, angle: float) -> Fold:
+    """The fold of a crease to an angle: imposed, or the rest angle of its spring or of its strip.
 
     Args:
+        model: whose crease it is.
         crease: its name.
-        angle: rad, positive the way that it is drawn.
-        law: of its spring; None where it has none.
+        angle: rad, positive the way that it is drawn; of a wide crease mountain positive.
     """
+    if crease in wide_names(model.mesh):
+        return Fold(crease, rest=math.pi - angle)
+    law = model.creases.get(crease)
     if law is None:
         return Fold(crease, by=angle)
     return Fold(crease, by=angle, Lstar=law.Lstar, stiffness=law.stiffness)

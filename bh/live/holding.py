@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from bh.model.model import Model
+from bh.loading.load_step import crease_hinges
+from bh.model.model import Model, drawn_flat
+from bh.model.wide_crease import wide_names
 from meshes import SheetMesh
+from meshes.topology import dihedral_angles
 
 
 def held(model: Model) -> Model:
@@ -49,3 +54,33 @@ def chains(mesh: SheetMesh, names: list[str]) -> list[str]:
             found.append(name)
             seen |= edges
     return [name for name in names if name in found]
+
+
+def handled(mesh: SheetMesh) -> list[str]:
+    """Names of the creases that a hand folds: chains that are drawn to be folded, and wide creases by their own names.
+
+    Args:
+        mesh: of the sheet.
+    """
+    drawn = [name for name in mesh.creases if mesh.folds.get(name) != "flat"]
+    return [*chains(mesh, drawn), *wide_names(mesh)]
+
+
+def drawn_folds(mesh: SheetMesh, names: list[str]) -> dict[str, float]:
+    """Fold angles that creases have in the mesh as it is drawn, which a FOLD file may give folded.
+
+    Args:
+        mesh: of the sheet.
+        names: of creases.
+
+    Returns:
+        mean angle by name, rad, positive the way that each is drawn; 0 where the mesh is flat.
+    """
+    if drawn_flat(mesh):
+        return dict.fromkeys(names, 0.0)
+    angles = math.pi - dihedral_angles(mesh.points, mesh.topology.hinges)
+    return {
+        name: float(angles[crease_hinges(mesh, name)].mean())
+        * (-1.0 if mesh.folds.get(name) == "valley" else 1.0)
+        for name in names
+    }

@@ -4,29 +4,26 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bh.errors import ModelError
-from bh.formulations.protocols import SheetSystem
-from bh.formulations.registry import formulation
 from bh.formulations.state import State
 from bh.live.controls import CLOSED, Controls, Way, fold_of
 from bh.live.floating import Floating
 from bh.live.frame import Frame
 from bh.live.grips import Grip, Jaws, Vector
-from bh.live.holding import chains, held
-from bh.live.march import March
-from bh.loading.builder import LoadStepBuilder
-from bh.loading.load_step import LoadStep, StepEnd
-from bh.model.actuations import Force, Pull
+from bh.live.history import Mark, lightened
+from bh.live.holding import drawn_folds, handled, held
+from bh.live.laying import Laying
+from bh.model.actuations import Pull
 from bh.model.model import Model
 from bh.model.step import Actuation, Step
 from bh.runtime.threads import one_blas_thread
 from bh.solvers.load_control import LoadControl
-from bh.solvers.points import Point, point
+from bh.solvers.points import Point
 from meshes import SheetMesh
 from meshes.mesh import count
 
@@ -38,26 +35,16 @@ JAWS = (
 )
 
 
-@dataclass(eq=False)
-class _Under:
-    """The way in hand: its load step and system, and the march along it."""
-
-    way: Way
-    load: LoadStep
-    system: SheetSystem
-    march: March
-
-
 class Session:
     """A sheet that answers while it is handled.
 
     A crease that is a spring in the model turns its rest angle, the others are imposed. The steps of the model are
-    not followed: the sheet begins flat. Without supports it is held at three nodes in its middle, which takes the
-    rigid motions and nothing else.
+    not followed: the sheet begins flat, or folded as its mesh is. Without supports it is held at three nodes in its
+    middle, which takes the rigid motions and nothing else.
     """
 
     def __init__(self, model: Model, settings: LoadControl | None = None, settles: bool = False) -> None:
-        """Begin flat and at rest.
+        """Begin flat, or as it is drawn, and at rest.
 
         Args:
             model: sheet, supports and creases.
@@ -75,20 +62,17 @@ class Session:
             held(replace(self.model, supports=())).supports == self.model.supports
         )  # but for its middle
         self._floating = Floating()
-        self._settings = settings or LoadControl()
-        self._settles = settles
-        self._formulation = formulation(self.model.formulation)
-        names = [name for name in self.mesh.creases if self.mesh.folds.get(name) != "flat"]
-        self._wanted = Controls(dict.fromkeys(chains(self.mesh, names), 0.0))
-        self._builder = LoadStepBuilder(self.model)
+        self._laying = Laying(self.model, settings or LoadControl(), settles)
+        self._wanted = Controls(drawn_folds(self.mesh, handled(self.mesh)))
         self._gone: tuple[int, ...] = ()
-        self._past: list[Controls] = []
-        self._undone: list[Controls] = []
+        self._past: list[Mark] = []
+        self._undone: list[Mark] = []
         self._iterations = 0
         self._stable: bool | None = True
         self._left = False
+        self._ways = 0  # that it began behind the one on which it stands at first, and turns on them
         self._seen: tuple[Array, State] | None = None  # the newest state, and the unknowns that it belongs to
-        self._under = self._begin(Way(self._wanted, self._wanted), None)
+        self._under = self._laying.begin(self._wanted, self._wanted)
 
     # ------------------------------------------------------------------------------- what a hand does
 
@@ -104,8 +88,17 @@ class Session:
 
     @property
     def left(self) -> bool:
-        """Whether it has snapped since it was flat: a run from flat may end on another branch."""
+        """Whether it has snapped since it was flat, or lies on another branch (`leave`): a run may end elsewhere."""
         return self._left
+
+    @property
+    def straight(self) -> bool:
+        """Whether it only went on from flat along one line of fold angles, without a snap, as a run from flat does."""
+        return self._ways <= 1 and not self._left
+
+    def leave(self) -> None:
+        """Note that a run from flat ends on another branch than this: what was found by such a run."""
+        self._left = True
 
     @property
     def newest(self) -> Point:
@@ -194,13 +187,13 @@ class Session:
         self._ask(self._wanted.without(node))
 
     def undo(self) -> bool:
-        """Go back to what was wanted when the sheet last was at rest with something else; False if there is nothing."""
-        while self._past and self._past[-1] == self._wanted:
+        """Go back to where the sheet last was at rest with something else; False if there is nothing."""
+        while self._past and self._past[-1].controls == self._wanted:
             self._past.pop()
         if not self._past:
             return False
-        undone = [*self._undone, self._wanted]
-        self._ask(self._past.pop())
+        undone = [*self._undone, self.mark()]
+        self.go_back(self._past.pop())
         self._undone = undone
         return True
 
@@ -208,10 +201,33 @@ class Session:
         """Take the last `undo` back; False if there is none, or something else was asked for since."""
         if not self._undone:
             return False
-        left, wanted = self._undone[:-1], self._undone[-1]
-        self._ask(wanted)
+        left, there = self._undone[:-1], self._undone[-1]
+        self.go_back(there)
         self._undone = left
         return True
+
+    def mark(self) -> Mark:
+        """Where it is, for `go_back`: what is asked for, and the state if it is at rest with that."""
+        here = self._under.march.here
+        if self._now() != self._wanted or self._under.fading or self._under.march.unseen:
+            return Mark(self._wanted, left=self._left)
+        return Mark(self._wanted, here.q, self._left)
+
+    def go_back(self, there: Mark) -> None:
+        """Ask for what was asked for then, and lie as the sheet lay then; where that is not known it goes there.
+
+        Args:
+            there: of a session of the same model.
+        """
+        self._ask(there.controls)
+        if there.q is None:
+            return
+        flat = replace(there.controls, folds=dict.fromkeys(there.controls.folds, 0.0))
+        under = self._laying.back(Way(flat, there.controls), there.q, 0)
+        if under is not None:
+            self._iterations += self._under.march.iterations
+            self._under, self._gone, self._left = under, (), there.left
+            self._ways += 1
 
     def ask(self, wanted: Controls) -> None:
         """Ask for all controls at once, such as those of another session of the same sheet.
@@ -252,9 +268,8 @@ class Session:
             self._left = self._left or snapped
             march.snapped = False
             frame = self._frame(snapped, time.perf_counter() - began)
-        if frame.at_rest and (not self._past or self._past[-1] != self._wanted):
-            self._past.append(self._wanted)
-            del self._past[:-REMEMBERED]
+        if frame.at_rest and (not self._past or self._past[-1].controls != self._wanted):
+            self._past = lightened([*self._past, self.mark()], REMEMBERED)
         return frame
 
     def rest(self, most: float = 60.0) -> Frame:
@@ -287,8 +302,7 @@ class Session:
         Returns:
             a model for `bh.trace`; where the sheet has `left` its branch on its way here, it may end on another one.
         """
-        laws = self.model.creases
-        folds = tuple(fold_of(name, angle, laws.get(name)) for name, angle in self._wanted.folds.items())
+        folds = tuple(fold_of(self.model, name, angle) for name, angle in self._wanted.folds.items())
         pulls: tuple[Actuation, ...] = tuple(
             Pull(node, grip.to, grip.stiffness) for node, grip in self._wanted.grips.items()
         )
@@ -315,7 +329,7 @@ class Session:
             return True
         if self._under.march.stuck:
             return False
-        if self._now() == self._wanted and not self._fading():
+        if self._now() == self._wanted and not self._under.fading:
             points = self._state().points if self._floats else None
             if points is None or not self._floating.due(self._wanted, points):
                 return False
@@ -328,17 +342,15 @@ class Session:
         under = self._under
         if under.march.stuck:
             return
-        if under.load.force.start.any():  # forces fade out on it: it leads to its end and no further
-            if under.way.end == self._wanted:
-                return
-        elif (lam := under.way.find(self._wanted)) is not None:
+        if (lam := under.lam_of(self._wanted)) is not None:
+            back = abs(lam) < abs(under.march.target) or lam * under.march.target < 0.0
+            self._ways += back  # past a place where branches meet it may come to another one
             under.march.target = lam
             return
         now = self._now()
         self._iterations += under.march.iterations
-        here = under.march.here
         state = self._state()
-        self._builder.end_early(under.load, StepEnd(here.lam, state.points, state.dihedral_angles))
+        self._laying.stop(under, state)
         self._release(now, state)
         start = now
         for node, grip in self._wanted.grips.items():
@@ -348,19 +360,14 @@ class Session:
                 start = replace(start, grips={**start.grips, node: Grip((x, y, z), grip.stiffness)})
         kept = {node: start.grips[node] for node in self._wanted.grips}
         start = Controls(start.folds, kept, self._wanted.jaws)
-        way = Way(start, self._wanted) if self._gone else Way.toward(start, self._wanted)
-        self._under = self._begin(way, state)
+        self._ways += 1
+        self._under = self._laying.begin(start, self._wanted, state, self._gone, under.march.unseen)
 
     @property
     def _floats(self) -> bool:
         """Whether nothing but jaws acts on the sheet, which are moved until both press alike."""
         jawed = {node for jaws in self._wanted.jaws for node in (jaws.a, jaws.b)}
         return self._free and bool(jawed) and jawed == self._wanted.grips.keys()
-
-    def _fading(self) -> bool:
-        """Whether the way in hand lets forces fade out that are still there: it has to be gone to its end."""
-        force = self._under.load.force
-        return bool(force.start.any()) and self._under.march.here.lam != 1.0
 
     def _release(self, now: Controls, state: State) -> None:
         """Nodes that are let go of keep their force as a dead one, which the next way fades out.
@@ -372,33 +379,14 @@ class Session:
         left = under.load.force.at(under.march.here.lam)
         gone = [node for node in now.grips if node not in self._wanted.grips]
         if gone:
-            each = {node: (left[node] + forces[node]).tolist() for node in gone}
-            keep = Step(tuple(Force([node], each=(x, y, z)) for node, (x, y, z) in each.items()))
-            self._builder.build(keep)
-        still = [node for node in self._gone if self._fading()]  # what has faded out is forgotten
+            self._laying.keep({node: (left[node] + forces[node]).tolist() for node in gone})
+        still = [node for node in self._gone if under.fading]  # what has faded out is forgotten
         self._gone = tuple(dict.fromkeys([*still, *gone]))
-
-    def _begin(self, way: Way, state: State | None) -> _Under:
-        items = way.actuations(self.model.creases, self._gone) or (Force([0], each=(0.0, 0.0, 0.0)),)
-        step = Step(items)
-        load = self._builder.build(step)
-        # shells look up the step that they are in: the first, or the one behind that of the state
-        walked = replace(self.model, steps=(step,) if state is None else (step, step))
-        system = self._formulation.system(walked, load, state)
-        q = system.start()
-        march = March(system, [point(system, q, 0.0)], 0.0, self._settings, self._settles)
-        march.unseen = state is not None and self._under.march.unseen
-        under = _Under(way, load, system, march)
-        if load.force.start.any():
-            march.target = 1.0
-        elif (lam := way.find(self._wanted)) is not None:
-            march.target = lam
-        return under
 
     def _now(self) -> Controls:
         """What the newest state is in equilibrium with."""
         under = self._under
-        if under.march.here.lam == under.way.find(self._wanted) and not self._fading():
+        if under.march.here.lam == under.lam_of(self._wanted) and not under.fading:
             return self._wanted  # to the last digit
         return under.way.at(under.march.here.lam)
 
@@ -406,7 +394,7 @@ class Session:
         under, here = self._under, self._under.march.here
         stable = None if under.march.unseen and here.negative is None else here.negative in (None, 0)
         if self._seen is None or self._seen[0] is not here.q:
-            state = self._formulation.observe(self.model, under.system, here.q, here.lam, 0, stable)
+            state = self._laying.formulation.observe(self.model, under.system, here.q, here.lam, 0, stable)
             self._seen = here.q, state
         elif self._seen[1].stable is not stable:
             self._seen = here.q, replace(self._seen[1], stable=stable)
@@ -432,7 +420,7 @@ class Session:
             self._under.march.stuck,
             iterations,
             seconds,
-            self._fading() or uneven,
+            self._under.fading or uneven,
             not self._under.march.unseen,
         )
 

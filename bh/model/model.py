@@ -21,7 +21,7 @@ from bh.model.springs import GroundSpring
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support
 from bh.model.until import Until
-from bh.model.wide_crease import strip_sheet
+from bh.model.wide_crease import strip
 from bh.model.zones import Sections, SheetZone, changed, sections
 from bh.runtime.consent import said
 from meshes import SheetMesh
@@ -142,7 +142,7 @@ class Model:
     def __repr__(self) -> str:
         """One line: "Model(384 triangles, 1 crease, 4 supports, 1 step, consistent)"."""
         supports = count(len(self.supports), "support") if self.supports else "rigid-body support"
-        creases = count(len(self.mesh.creases), "crease")
+        creases = count(len(self.mesh.drawn_creases), "crease")
         triangles, steps = count(len(self.mesh.triangles), "triangle"), count(len(self.steps), "step")
         return f"Model({triangles}, {creases}, {supports}, {steps}, {self.formulation})"
 
@@ -286,7 +286,8 @@ class Model:
 
         Args:
             name: of the crease.
-            Lstar: of the sharp crease that it stands for, mm: the sheet's material, as thin as it takes.
+            Lstar: of the sharp crease that it stands for, mm: the material around it, as thin as it takes. Zones that
+                it lies in come before it.
             stiffness: the same, N mm / (mm rad).
             sheet: the strip's material and thickness, instead of the model's.
             stiff: factor of the moduli.
@@ -295,8 +296,8 @@ class Model:
         Raises:
             ModelError: there is no such strip, or it is told twice or not at all; one line.
         """
-        made = strip_sheet(self.mesh, name, self.sheet, Lstar, stiffness, sheet, stiff, **values)
-        return replace(self, zones=(*self.zones, SheetZone(f"strip:{name}", made)))
+        made = strip(self.mesh, name, self.sheet, Lstar, stiffness, sheet, stiff, self.zones, **values)
+        return replace(self, zones=(*self.zones, made))
 
     def step(
         self,

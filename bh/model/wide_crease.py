@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.model.sheet import Sheet
 from bh.model.step import StepBuilder
-from bh.model.zones import changed, triangles_in
+from bh.model.zones import SheetZone, changed, is_strip, sections, triangles_in
 from meshes import SheetMesh
 from meshes.curves import Array, sample
 from meshes.quantities import Typed, number
@@ -35,7 +35,7 @@ def wide_names(mesh: SheetMesh) -> tuple[str, ...]:
     Returns:
         without "strip:".
     """
-    return tuple(name.removeprefix(STRIP) for name in mesh.edge_sets if name.startswith(STRIP))
+    return mesh.wide_creases
 
 
 def folding(mesh: SheetMesh) -> tuple[str, ...]:
@@ -45,14 +45,12 @@ def folding(mesh: SheetMesh) -> tuple[str, ...]:
         mesh: of the sheet.
 
     Returns:
-        those of lines, then the wide ones in place of their two lines.
+        in order, wide ones by their own name in place of their two lines.
     """
-    wide = wide_names(mesh)
-    lines = {f"{name}-{side}" for name in wide for side in SIDES}
-    return (*(name for name in mesh.creases if name not in lines), *wide)
+    return mesh.drawn_creases
 
 
-def strip_sheet(
+def strip(
     mesh: SheetMesh,
     name: str,
     sheet: Sheet,
@@ -60,23 +58,26 @@ def strip_sheet(
     stiffness: Typed | None = None,
     other: Sheet | None = None,
     stiff: float = 1.0,
+    zones: Sequence[SheetZone] = (),
     **values: float | str | None,
-) -> Sheet:
-    """What the strip of a wide crease is made of.
+) -> SheetZone:
+    """The strip of a wide crease, as a zone of what it is made of.
 
     Args:
         mesh: with the strip.
         name: of the crease.
-        sheet: around it.
-        Lstar: of the sharp crease that the strip stands for, mm: the strip is the sheet's material, so thin that it
-            turns by the same angle under the same moment.
+        sheet: of the model.
+        Lstar: of the sharp crease that the strip stands for, mm, as ever of the sheet of the model: the strip is the
+            material around it, so thin that it turns by the same angle under the same moment.
         stiffness: the same as a moment a length and angle, N mm / (mm rad).
-        other: what the strip is made of, instead of the sheet around it.
+        other: what the strip is made of, instead of the sheet of the model.
         stiff: factor of the moduli.
+        zones: of the sheet; with `Lstar` or `stiffness` the strip is made of what they have around it.
         **values: fields of `bh.Sheet`, such as t.
 
     Raises:
-        ModelError: the mesh has no such strip, or what is given cannot be, or is given twice; one line.
+        ModelError: the mesh has no such strip, or what is given cannot be, or is given twice, or the strip goes through
+            several zones; one line.
     """
     if name not in wide_names(mesh):
         known = ", ".join(wide_names(mesh)) or "none; draw them by meshes.wide_creases"
@@ -88,12 +89,11 @@ def strip_sheet(
             f"wide crease '{name}' needs Lstar or stiffness, or what its strip is made of: t, E, material or stiff"
         )
     if Lstar is None and stiffness is None:
-        return changed(sheet if other is None else other, stiff, **values)
+        return SheetZone(STRIP + name, changed(sheet if other is None else other, stiff, **values))
     if len(given) > 1:
-        raise ModelError(
-            f"wide crease '{name}' has {given[0]} and {given[1]}, which say the same; give one of them"
-        )
-    if sheet.plies is not None:
+        raise ModelError(told_twice(f"wide crease '{name}'", *given[:2]))
+    around = _around(mesh, name, sheet, zones)
+    if around.plies is not None:
         raise ModelError(
             f"wide crease '{name}': a strip of a laminate cannot be told by {given[0]}; give what it is made of"
         )
@@ -103,8 +103,44 @@ def strip_sheet(
     k = value if stiffness is not None else sheet.bending_stiffness(nu=0.0) / value
     wide = float(np.mean(_Ways(mesh, name).across(_stations(mesh, name))[1]))
     # a strip turns by the sharp crease's angle and by the sheet's
-    softer = k * wide / sheet.bending_stiffness()
-    return replace(sheet, t=sheet.t * (softer / (1.0 + softer)) ** (1.0 / 3.0))
+    softer = k * wide / around.bending_stiffness()
+    made = replace(around, t=around.t * (softer / (1.0 + softer)) ** (1.0 / 3.0))
+    return SheetZone(STRIP + name, made, instead=around)
+
+
+def told_twice(what: str, one: str, other: str) -> str:
+    """The message where a strip is told by `Lstar` or `stiffness` and by something else.
+
+    Args:
+        what: in words, or its place in a scene.
+        one: the one key.
+        other: what stands beside it.
+
+    Returns:
+        one line.
+    """
+    if other == "stiffness":
+        return (
+            f"{what} has {one} and {other}, which are two ways to say how easily it turns; give one of them"
+        )
+    return f"{what} has {one}, from which its thickness follows, and {other}; leave out one of them"
+
+
+def _around(mesh: SheetMesh, name: str, sheet: Sheet, zones: Sequence[SheetZone]) -> Sheet:
+    """The sheet that a strip is in place of."""
+    others = tuple(zone for zone in zones if not is_strip(zone))
+    made = sections(mesh, sheet, others)
+    if made.of is None:
+        return sheet
+    there = np.unique(made.of[triangles_in(mesh, STRIP + name, f"wide crease '{name}'")])
+    found = made.sheets[int(there[0])]
+    if any(made.sheets[int(number)] != found for number in there):
+        parts = " and ".join(f"zone {number}" if number else "the sheet around it" for number in there[::-1])
+        raise ModelError(
+            f"the strip of wide crease '{name}' lies in {parts}, so no one thickness makes it as soft as a crease; "
+            "give what it is made of (t, E, material or stiff), or end zones at the strip"
+        )
+    return found
 
 
 class _Ways:
@@ -164,16 +200,30 @@ def fold_strips(
     names = [name for name in wide_names(mesh) if crease in (name, "all")]
     for name in names:
         if not isinstance(rest, int | float) or list(given) != ["rest"]:
-            raise ModelError(
-                f"crease '{name}' is a strip and has no line whose angle could be imposed: give rest, one dihedral "
-                "angle in rad, and nothing else; its stiffness is that of the strip"
-            )
+            raise _not_for_strips(crease, name, given)
         inside = np.flatnonzero(triangles_in(mesh, STRIP + name, f"fold of crease '{name}'"))
         builder.grow(
             inside, np.zeros((len(inside), 3)), rest_curvature(mesh, name, inside, math.pi - float(rest))
         )
     sharp = any(mesh.folds.get(each, "flat") != "flat" for each in mesh.creases)
     return crease in names or (bool(names) and not sharp)
+
+
+def _not_for_strips(crease: str, name: str, given: Sequence[str]) -> ModelError:
+    """What to say of a fold that strips cannot do."""
+    beside = next((key for key in given if key not in ("to", "by", "rest")), None)
+    if "rest" in given and beside is not None:
+        others = (
+            ", and that of lines for each of them (creases.NAME, Model.crease)" if crease == "all" else ""
+        )
+        return ModelError(
+            f"fold of crease '{crease}' has {beside}, but crease '{name}' is a strip: leave {beside} out; its "
+            f"stiffness is told where its width is (creases.{name}, Model.wide_crease){others}"
+        )
+    return ModelError(
+        f"fold of crease '{crease}' has {given[0]}, but crease '{name}' is a strip and has no line whose angle could "
+        "be imposed: give rest, one dihedral angle in rad, and nothing else; its stiffness is that of the strip"
+    )
 
 
 def rest_curvature(mesh: SheetMesh, name: str, triangles: Ints, fold: float) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -71,14 +71,21 @@ class SheetZone:
             flat lines of a layer of the drawing; "strip:NAME", a wide crease; "all"; several of these; or the corners
             of a polygon, (k, 2), mm: the triangles whose middle lies in it.
         sheet: its material and thickness.
+        instead: of a strip whose thickness follows from the sheet in whose place it is: that sheet. It is not stored.
     """
 
     where: Where
     sheet: Sheet
+    instead: Sheet | None = field(default=None, compare=False, repr=False)
 
     if TYPE_CHECKING:
 
-        def __init__(self, where: str | Sequence[str] | Sequence[Sequence[float]], sheet: Sheet) -> None:
+        def __init__(
+            self,
+            where: str | Sequence[str] | Sequence[Sequence[float]],
+            sheet: Sheet,
+            instead: Sheet | None = None,
+        ) -> None:
             """See the attributes."""
 
     def __post_init__(self) -> None:
@@ -128,16 +135,17 @@ def sections(mesh: SheetMesh, sheet: Sheet, zones: tuple[SheetZone, ...]) -> Sec
         zones: that do not overlap; strips of wide creases are taken out of the others.
 
     Raises:
-        ModelError: a zone that has no triangle, or two that share one; one line.
+        ModelError: a zone that has no triangle, or two that share one, or one that is laid around a strip whose
+            thickness was chosen for another sheet; one line.
     """
     if not zones:
         return Sections((sheet,), None)
     of = np.zeros(len(mesh.triangles), dtype=np.int64)
-    strips = [number for number, zone in enumerate(zones, 1) if _is_strip(zone)]
-    for number, zone in sorted(enumerate(zones, 1), key=lambda item: _is_strip(item[1])):
+    strips = [number for number, zone in enumerate(zones, 1) if is_strip(zone)]
+    for number, zone in sorted(enumerate(zones, 1), key=lambda item: is_strip(item[1])):
         inside = triangles_in(mesh, zone.where, f"zone {number}")
         taken = inside & (of > 0)
-        if _is_strip(zone):  # it is taken out of zones around it
+        if is_strip(zone):  # it is taken out of zones around it
             taken &= np.isin(of, strips)
         twice = np.flatnonzero(taken)
         if len(twice):
@@ -145,9 +153,21 @@ def sections(mesh: SheetMesh, sheet: Sheet, zones: tuple[SheetZone, ...]) -> Sec
             raise ModelError(
                 f"zones {of[twice[0]]} and {number} overlap at ({x:.4g}, {y:.4g}) mm; let every place be in one"
             )
+        if is_strip(zone):
+            _check_instead(zone, [sheet if n == 0 else zones[n - 1].sheet for n in np.unique(of[inside])])
         of[inside] = number
     of.setflags(write=False)
     return Sections((sheet, *(zone.sheet for zone in zones)), of)
+
+
+def _check_instead(strip: SheetZone, around: Sequence[Sheet]) -> None:
+    """See that a strip lies where the sheet is that its thickness was chosen for."""
+    if strip.instead is not None and any(sheet != strip.instead for sheet in around):
+        raise ModelError(
+            f"wide crease '{str(strip.where).removeprefix(STRIP)}' has Lstar or stiffness and was made as thin as that "
+            f"takes in a sheet of t = {strip.instead.t:g} mm, but a zone that was added later makes the sheet there of "
+            "something else; add zones before wide creases"
+        )
 
 
 def triangles_in(mesh: SheetMesh, where: str | Sequence[str] | Sequence[Sequence[float]], what: str) -> Bools:
@@ -234,7 +254,12 @@ def _enclosed(mesh: SheetMesh, place: str, what: str) -> Bools:
     return np.asarray(inside)
 
 
-def _is_strip(zone: SheetZone) -> bool:
+def is_strip(zone: SheetZone) -> bool:
+    """Is it the strip of a wide crease?
+
+    Args:
+        zone: of a sheet.
+    """
     return isinstance(zone.where, str) and zone.where.startswith(STRIP)
 
 

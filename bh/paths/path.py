@@ -176,7 +176,7 @@ class Path:
         arc = [record for record in self.records if record.note.startswith(ARC)]
         if arc:
             found.append(f"{count(len(arc), 'state')} found by arc length")
-        found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.jumped and r not in arc]
+        found += [f"step {r.step + 1}: {r.note}" for r in self.records if r.telling]
         found += [
             f"step {n + 1}: {end.reason}" for n, end in enumerate(self.steps) if end.reached and end.reason
         ]

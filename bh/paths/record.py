@@ -13,9 +13,9 @@ from bh.errors import PathFileError
 from bh.model.model import Model
 from bh.paths.storage import StateRow
 from bh.paths.stored import line, mapping
-from bh.solvers.lagging import LAGS, SETTLED, Lagging
+from bh.solvers.lagging import SETTLED, Lagging
 from bh.solvers.outcome import Critical, Outcome
-from bh.solvers.points import LOAD, CriticalPoint, Mode
+from bh.solvers.points import ARC, LOAD, NOT_STABLE, CriticalPoint, Mode
 from bh.solvers.system import Remembering, System
 from meshes.mesh import count
 
@@ -96,6 +96,11 @@ class Record:
     critical: tuple[CriticalPoint, ...] = ()
     history: Array | None = None
 
+    @property
+    def telling(self) -> bool:
+        """Does its note tell more than how it was found: of a jump, or of an end that is not stable?"""
+        return NOT_STABLE in self.note or (self.jumped and not self.note.startswith(ARC))
+
     @classmethod
     def of_row(cls, row: StateRow) -> Record:
         """The record that a path file has stored as a row."""
@@ -168,8 +173,8 @@ def not_settled(records: Sequence[Record], system: Callable[[int], System]) -> l
         left = [change for change in map(asked.unsettled, histories) if change > SETTLED]
         if left:
             lines.append(
-                f"step {step + 1}: friction had not settled after {LAGS} rounds in {len(left)} of "
-                f"{count(len(histories), 'state')}: its forces still change by {max(left):.2%}; "
+                f"step {step + 1}: friction had not settled in {len(left)} of "
+                f"{count(len(histories), 'state')}: its forces still change by up to {max(left):.2%}; "
                 "take shorter increments"
             )
     return lines

@@ -17,6 +17,7 @@ from bh.model.supports import AXES, Support
 from bh.plotting.offscreen import PlotError
 from bh.solvers.outcome import Critical
 from meshes.mesh import count
+from meshes.wide import WIDE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -208,8 +209,8 @@ def _direction(along: str | Sequence[float]) -> Array:
 def pattern(model: Model) -> Figure:
     """The flat pattern: outline, mesh, mountain (full), valley (dashed) and flat (dotted) creases, supports.
 
-    A support is marked by the letters that it fixes, once a place; a triangle stands on its nodes, a square where the
-    slope is held too.
+    A wide crease is its two lines, dotted. A support is marked by the letters that it fixes, once a place; a triangle
+    stands on its nodes, a square where the slope is held too.
 
     Args:
         model: of which mesh and supports are drawn.
@@ -221,8 +222,8 @@ def pattern(model: Model) -> Figure:
     _edges(axes, mesh, mesh.topology.boundary, INK, "-", 1.6)
     seen: set[str] = set()
     for crease in mesh.creases:
-        fold = mesh.folds.get(crease, "flat")
-        colour, dashes = FOLDS.get(fold, FOLDS["flat"])
+        fold = WIDE if crease in mesh.side_of else f"{mesh.folds.get(crease, 'flat')} crease"
+        colour, dashes = FOLDS.get(fold.split()[0], FOLDS["flat"])
         _edges(
             axes,
             mesh,
@@ -230,7 +231,7 @@ def pattern(model: Model) -> Figure:
             colour,
             dashes,
             2.0,
-            None if fold in seen else f"{fold} crease",
+            None if fold in seen else fold,
         )
         seen.add(fold)
     for number, support in enumerate(s for s in model.supports if isinstance(s, Support)):

@@ -234,7 +234,7 @@ def _from_tables(data: dict[str, object], folder: Path) -> Scene:
     model = Model(
         mesh=not_flat(data, drawn.mesh),
         sheet=sheet,
-        zones=(*zones, *strips_of(drawn.mesh, wide, sheet)),
+        zones=(*zones, *strips_of(drawn.mesh, wide, sheet, zones)),
         supports=tuple(_support(item, f"supports[{i}]") for i, item in enumerate(supports)),
         steps=tuple(step for legs in asked for step in legs),
         creases={

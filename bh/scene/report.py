@@ -14,6 +14,7 @@ from bh.formulations.registry import remarks
 from bh.model.refinement import Goal
 from bh.model.sheet import Sheet
 from bh.model.supports import Support, select
+from bh.model.zones import triangles_in
 from bh.scene.load import Scene
 from meshes import SheetMesh
 from meshes.curves import Array, sample
@@ -21,6 +22,7 @@ from meshes.io.export import replacing
 from meshes.io.flat_lines import flat_lines
 from meshes.io.writing import LOOKS
 from meshes.mesh import count
+from meshes.wide import STRIP, WIDE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,7 +65,10 @@ def report(scene: Scene) -> list[str]:
         *_zones(scene),
         f"mesh: {mesh!r}; {model.formulation}" if scene.accuracy is None else _chosen(scene.accuracy),
     ]
-    for name in mesh.creases[:SHOWN]:
+    for name in mesh.drawn_creases[:SHOWN]:
+        if name in mesh.wide_creases:
+            lines.append(_wide(mesh, name))
+            continue
         pairs = mesh.crease_edges(name)
         length = float(np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1).sum())
         angles = mesh.fold_angles.get(name)
@@ -75,8 +80,8 @@ def report(scene: Scene) -> list[str]:
         lines.append(
             f"crease {name}: {mesh.folds.get(name, 'not drawn')}, {length:.5g} mm, {count(len(pairs), 'edge')}{drawn}"
         )
-    if len(mesh.creases) > SHOWN:
-        lines.append(f"and {len(mesh.creases) - SHOWN} more creases")
+    if len(mesh.drawn_creases) > SHOWN:
+        lines.append(f"and {len(mesh.drawn_creases) - SHOWN} more creases")
     places = [name for name in (*mesh.corners, *mesh.edge_sets) if not name.startswith("crease:")]
     more = f" and {len(places) - SHOWN} more" if len(places) > SHOWN else ""
     lines.append(f"places: {', '.join(places[:SHOWN]) or 'none'}{more}")
@@ -152,7 +157,7 @@ def _figure(scene: Scene) -> Figure:
     )
     names = set()
     for layer, points in _outlines(mesh):
-        colour, dashes, _ = LOOKS[layer]
+        colour, dashes, _ = LOOKS["flat" if layer == WIDE else layer]
         style: str | tuple[float, tuple[float, ...]] = (
             (0.0, tuple(1.2 * x for x in dashes)) if dashes else "-"
         )
@@ -171,15 +176,28 @@ def _figure(scene: Scene) -> Figure:
     return figure
 
 
+def _wide(mesh: SheetMesh, name: str) -> str:
+    """A line on a wide crease: how long and wide its strip is."""
+    lengths = [
+        float(np.linalg.norm(np.diff(mesh.points[mesh.crease_edges(line)], axis=1), axis=2).sum())
+        for line, crease in mesh.side_of.items()
+        if crease == name
+    ]
+    length = sum(lengths) / len(lengths)
+    area = float(mesh.areas[triangles_in(mesh, f"{STRIP}{name}", f"crease {name}")].sum())
+    return f"crease {name}: a strip, {length:.5g} mm long and {area / length:.4g} mm wide"
+
+
 def _outlines(mesh: SheetMesh) -> list[tuple[str, Array]]:
-    """Layers and points (k, 2) of boundary and creases, seen from +z."""
+    """Layers, or `WIDE`, and points (k, 2) of boundary and creases, seen from +z."""
+    sides = mesh.side_of
     if mesh.flat:
-        return [(line.layer, sample(line.curve)) for line in flat_lines(mesh) if line.layer != "facet"]
+        lines = [line for line in flat_lines(mesh) if line.layer != "facet"]
+        return [(WIDE if line.name in sides else line.layer, sample(line.curve)) for line in lines]
     found = [("boundary", mesh.points[pair][:, :2]) for pair in mesh.topology.boundary]
     for name in mesh.creases:
-        found += [
-            (mesh.folds.get(name, "flat"), mesh.points[pair][:, :2]) for pair in mesh.crease_edges(name)
-        ]
+        layer = WIDE if name in sides else mesh.folds.get(name, "flat")
+        found += [(layer, mesh.points[pair][:, :2]) for pair in mesh.crease_edges(name)]
     return found
 
 

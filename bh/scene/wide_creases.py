@@ -6,7 +6,7 @@ from pydantic import Field
 
 from bh.errors import SceneError
 from bh.model.sheet import Sheet
-from bh.model.wide_crease import strip_sheet, wide_names
+from bh.model.wide_crease import strip, told_twice, wide_names
 from bh.model.zones import SheetZone
 from bh.scene.reading import LSTAR, Scale, Stiff, as_table, nearest, read_table, within
 from bh.scene.sheets import OtherSheetTable, zone_of
@@ -67,13 +67,16 @@ def widened(pattern: CreasePattern, creases: dict[str, object]) -> CreasePattern
     return pattern
 
 
-def strips_of(mesh: SheetMesh, creases: dict[str, dict[str, object]], sheet: Sheet) -> tuple[SheetZone, ...]:
+def strips_of(
+    mesh: SheetMesh, creases: dict[str, dict[str, object]], sheet: Sheet, zones: tuple[SheetZone, ...]
+) -> tuple[SheetZone, ...]:
     """Zones of the strips.
 
     Args:
         mesh: of the widened pattern.
         creases: tables of the wide ones.
         sheet: of the scene.
+        zones: of the scene.
 
     Returns:
         one a strip.
@@ -91,10 +94,9 @@ def strips_of(mesh: SheetMesh, creases: dict[str, dict[str, object]], sheet: She
             other = next((key for key in item if key not in OWN), None)
             if other is not None:
                 one = "Lstar" if table.Lstar is not None else "stiffness"
-                raise SceneError(f"{at} has {one} and {other}, which say the same; give one of them")
+                raise SceneError(told_twice(at, one, other))
             with within(at):
-                made = strip_sheet(mesh, name, sheet, table.Lstar, table.stiffness)
-            found.append(SheetZone(STRIP + name, made))
+                found.append(strip(mesh, name, sheet, table.Lstar, table.stiffness, zones=zones))
             continue
         material = {key: value for key, value in item.items() if key not in OWN}
         found.append(zone_of({**material, "where": STRIP + name}, sheet, at))

@@ -79,6 +79,18 @@ class Barrier(Protocol):
         """Does anything press?"""
         ...
 
+    def room(self, x: Array) -> float:
+        """What is left of the reach to the pair that presses hardest, in parts of it."""
+        ...
+
+    def harden(self, factor: float) -> None:
+        """Press by a number of times what the model asks for.
+
+        Args:
+            factor: 1 for the model's own.
+        """
+        ...
+
     def asleep(self) -> AbstractContextManager[None]:
         """While it lasts it keeps nothing apart."""
         ...
@@ -194,6 +206,25 @@ class InTheWay:
         """
         x = self.near(q, lam)
         return any(barrier.presses(barrier.places(x, lam)) for barrier in self.barriers)
+
+    def room(self, q: Array, lam: float) -> float:
+        """What the pair that presses hardest at q (size,) has left of the reach of its barrier, 0 to 1.
+
+        Args:
+            q: (size,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        x = self.near(q, lam)
+        return min((barrier.room(barrier.places(x, lam)) for barrier in self.barriers), default=1.0)
+
+    def harden(self, factor: float) -> None:
+        """Let everything press by a number of times what the model asks for, until told otherwise.
+
+        Args:
+            factor: 1 for the model's own.
+        """
+        for barrier in self.barriers:
+            barrier.harden(factor)
 
     def reshaped(self, one: tuple[Array, float], other: tuple[Array, float]) -> float:
         """By how much two shapes differ, rigid motions aside: the norm over all nodes, mm.

@@ -25,6 +25,7 @@ class Mode(StrEnum):
 
 
 LOAD, ARC, DISPLACEMENT = Mode.LOAD, Mode.ARC, Mode.DISPLACEMENT
+NOT_STABLE = "the state at the value that ends the step is not stable"  # how a note on an increment says it
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bh.solvers.factor import Factor
+from bh.solvers.factor import Descent, Factor
+from bh.solvers.hardening import Hardening
 from bh.solvers.hinged import Hinged
 from bh.solvers.load_control import jump
 from bh.solvers.modes import NEUTRAL, ROUNDED, count_negative, factorise_shifted
@@ -145,12 +146,25 @@ class Settling:
         Returns:
             what came of it; the unknowns before every step are given on the way.
         """
+        harder = Hardening(system)
+        try:
+            return (yield from self._steps(system, q, lam, harder))
+        finally:
+            harder.end()
+
+    def _steps(
+        self, system: System, q: Array, lam: float, harder: Hardening
+    ) -> Generator[Array, None, Solution]:
+        """The steps of a motion; barriers are the model's again at its end, and `harder` than that on the way."""
         now, shift, still = system.evaluate(q, lam), self.shift, 0
         for step in range(self.most):
             yield q
             matrix = system.tangent(q, lam, now.forces).matrix
             if now.imbalance <= self.newton.tolerance or (still > 3 and now.imbalance <= CALM):
-                return Solution(q, now, step, True, "", count_negative(matrix), True)
+                if not harder.ease():
+                    return Solution(q, now, step, True, "", count_negative(matrix), True)
+                now, still = system.evaluate(q, lam), 0
+                continue
             factor, shift = factorise_shifted(matrix, shift, least=NEUTRAL if still else ROUNDED)
             if factor is None:
                 return Solution(q, now, step, False, "singular tangent", globalised=True)
@@ -159,14 +173,18 @@ class Settling:
                 if shift > 1e-9 and now.imbalance < NEAR_SADDLE
                 else None
             )
-            moved = (*rolled, 1.0) if rolled is not None else _downhill(system, q, lam, now, factor)
+            free = factor.descend(now.residual)
+            moved = (*rolled, 1.0) if rolled is not None else _downhill(system, q, lam, now, factor, free)
             if moved is None:
                 if shift > 1e3:
                     return Solution(q, now, step, False, "no way downhill", globalised=True)
                 shift = max(10.0 * shift, 1e-4)
                 continue
-            before = now
+            before, came = now, q
             q, now, length = moved
+            if rolled is None and harder.mind(q, lam, free.direction, q - came):
+                now, still = system.evaluate(q, lam), 0
+                continue
             still = still + 1 if abs(now.merit - before.merit) <= STILL * abs(now.merit) else 0
             if still > STUCK:
                 return Solution(q, now, step, False, "the energy no longer falls", globalised=True)
@@ -182,15 +200,15 @@ def _guess(points: Sequence[Point], lam: float) -> tuple[Array, float, Array]:
 
 
 def _downhill(
-    system: System, q: Array, lam: float, now: Evaluation, factor: Factor
+    system: System, q: Array, lam: float, now: Evaluation, factor: Factor, free: Descent
 ) -> tuple[Array, Evaluation, float] | None:
-    """A step along which the merit falls enough and no hinge turns too far; None if there is none."""
+    """A step along `free` by which the merit falls enough and no hinge turns too far; None if there is none."""
     return line_search(
         system,
         q,
         lam,
         now,
-        around(system, q, lam, factor.descend(now.residual), factor, now.residual),
+        around(system, q, lam, free, factor, now.residual),
         TRIED,
         lambda trial: _too_far(system, q, trial, lam),
     )

@@ -261,6 +261,23 @@ class Hindered(Limited, Protocol):
         """
         ...
 
+    def room(self, q: Array, lam: float) -> float:
+        """What the pair that presses hardest has left of the reach of its barrier, 0 to 1.
+
+        Args:
+            q: (n,) unknowns.
+            lam: load parameter of the step, 0 to 1.
+        """
+        ...
+
+    def harden(self, factor: float) -> None:
+        """Let everything press by a number of times what the model asks for, until told otherwise.
+
+        Args:
+            factor: 1 for the model's own.
+        """
+        ...
+
     def reshaped(self, one: tuple[Array, float], other: tuple[Array, float]) -> float:
         """By how much two shapes differ, rigid motions aside: the norm over all nodes, mm.
 

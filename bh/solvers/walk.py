@@ -10,8 +10,9 @@ from typing import Protocol
 from bh.solvers.diagnosis import diagnose
 from bh.solvers.goal import locate_zero
 from bh.solvers.outcome import Outcome
-from bh.solvers.points import Increment, Point
+from bh.solvers.points import NOT_STABLE, Increment, Point
 from bh.solvers.system import System
+from meshes.mesh import count
 
 SHORTER = 0.25  # of an increment beyond a target, where its path was lost
 MOST_SHORTER = 4  # times that it is walked anew
@@ -79,6 +80,12 @@ def walk(task: Walk) -> Iterator[Increment]:
         )
 
 
+def _not_stable(target: Point, shorter: int) -> str:
+    """A note on a state that ends a step and was to be stable, and how often it was walked to anew."""
+    anew = f", also in increments {round(SHORTER**-shorter)} times shorter" if shorter else ""
+    return f"{NOT_STABLE} ({count(target.negative or 0, 'negative mode')}{anew})"
+
+
 def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float]) -> Iterator[Increment]:
     """Increments up to the zero of `goal`; the last one is that state.
 
@@ -116,6 +123,7 @@ def _until(task: Walk, items: Iterator[Increment], goal: Callable[[Point], float
                 imbalance=imbalance,
                 critical=(),
                 factorised=None,
+                note="; ".join(filter(None, (item.note, _not_stable(target, shorter) if lost else ""))),
             )
             return
         yield replace(item, iterations=item.iterations + spent) if spent else item

@@ -14,23 +14,28 @@ from numpy.typing import NDArray
 import bh.studio.messages as asked
 from bh.analysis.contact import self_contact
 from bh.errors import InputError
-from bh.live import Controls, Session, held
-from bh.live.holding import chains
+from bh.formulations.state import State
+from bh.live import Controls, Mark, Session, held
+from bh.live.history import lightened
+from bh.live.holding import handled
 from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
 from bh.solving.trace import trace
+from bh.studio.branch import FromFlat, from_flat
 from bh.studio.colours import offered, top_of
 from bh.studio.exports import export, film, moving
 from bh.studio.finer import Finer, finer
-from bh.studio.frames import Json, creases_of, described, head_of, line, packed, surface
+from bh.studio.frames import Json, creases_of, described, line, packed, surface
+from bh.studio.pictures import Pictures
 from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
 
 BUDGET = 0.03  # s of an update
 FARTHEST = 10.0  # sizes of the sheet that a hand may be away from it
 REMEMBERED = 200  # strokes that are taken back
+LONGEST_REST = 20.0  # s that a file may wait for the state at rest, and for a run from flat
 TIDY = 5.0  # s between two times that free memory goes back to the system
 
-Asked = tuple[LiveSheet, Controls, str]
+Was = tuple[LiveSheet, Mark, str]
 
 
 class Desk:
@@ -47,31 +52,32 @@ class Desk:
         self._colour = "bending"
         self._shown: tuple[object, ...] = ()
         self._snapped = False  # since the last picture
-        self._pictured: tuple[
-            object, ...
-        ] = ()  # what the window has: positions, colour, whether at rest and why not
-        self._top = 0.0  # of the scale of its colours
+        self._pictures = Pictures()
         self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
+        self._flat: tuple[State, FromFlat] | None = None  # a state, and where a run from flat ends
         self._tidied = time.monotonic()
         self._news: list[Json] = []
-        self._past: list[Asked] = []  # before every stroke
-        self._undone: list[Asked] = []
+        self._past: list[Was] = []  # before every stroke
+        self._undone: list[Was] = []
         self._stroke: tuple[object, ...] | None = None
         self.put(sheet or of_library("arc"))
 
     # ------------------------------------------------------------------------------- what is asked
 
-    def put(self, sheet: LiveSheet, controls: Controls | None = None) -> None:
+    def put(self, sheet: LiveSheet, controls: Controls | None = None, there: Mark | None = None) -> None:
         """Put a sheet on the desk.
 
         Args:
             sheet: to be handled.
-            controls: as it was handled before; None for flat.
+            controls: as it was handled before; None for flat, or as it is drawn.
+            there: where it lay when it was on the desk before; None for a new one.
         """
         model = sheet.model if sheet.model.supports else held(sheet.model)
         session = Session(model, settles=sheet.settles)
         if controls is not None:
             session.ask(controls)
+        if there is not None:
+            session.go_back(there)
         self.sheet = sheet if model is sheet.model else replace(sheet, model=model)
         self.session = session
         self.frame = self.session.update(0.0)
@@ -96,23 +102,25 @@ class Desk:
         """
         if isinstance(message, asked.Plain):
             return self._plain(message.do)
-        before = self._asked()
+        before, asked_before = self._was(), (self._now(), self.material)
         answers = [self.describe()] if self._laid(message) else self._done(message)
-        if self._asked() != before:
+        if (self._now(), self.material) != asked_before:
             self._remember(message, before)
         return answers
 
-    def _asked(self) -> Asked:
-        """What lies on the desk and what is asked of it, to go back to."""
-        return self.sheet, self.session.wanted, self.material
+    def _was(self) -> Was:
+        """What lies on the desk and how, to go back to."""
+        return self.sheet, self.session.mark(), self.material
 
-    def _remember(self, message: asked.Asked, before: Asked) -> None:
+    def _remember(self, message: asked.Asked, before: Was) -> None:
         """What was asked for before a stroke; its moves after the first are of one change with it."""
         number = message.stroke if isinstance(message, asked.Move) else None
         stroke = None if number is None else (message.do, number, *_moved(message))
         if stroke is None or stroke != self._stroke:
             self._past.append(before)
-            del self._past[:-REMEMBERED]
+            marks = lightened([mark for _, mark, _ in self._past], REMEMBERED)
+            kept = self._past[-REMEMBERED:]
+            self._past = [(sheet, mark, made) for (sheet, _, made), mark in zip(kept, marks, strict=True)]
         self._stroke = stroke
         self._undone.clear()
 
@@ -135,7 +143,11 @@ class Desk:
             case asked.Colour(by=by):
                 self._paint(by)
             case asked.Export(what=what):
-                name, data = export(what, self.sheet, self.session, self.session.rest(20.0))
+                self.frame = self.session.rest(LONGEST_REST)
+                if what in ("scene", "python"):
+                    ends = time.monotonic() + LONGEST_REST
+                    self.from_flat(lambda: time.monotonic() < ends)
+                name, data = export(what, self.sheet, self.session, self.frame)
                 return [_file(name, data), *self._behind_a_snap(what, name)]
             case asked.Film(pictures=pictures, ms=ms, kind=kind):
                 name = f"{Path(self.sheet.name).stem or 'sheet'}.{kind}"
@@ -166,32 +178,28 @@ class Desk:
     def _plain(self, what: str) -> list[Json]:
         if what == "check":
             return [self._check()]
-        now = self._asked()
+        now = self._was()
         if what == "flatten":
             flat = Controls(dict.fromkeys(self.session.creases, 0.0))
             if flat != self.session.wanted:
                 self._past.append(now)
                 self._undone.clear()
-                self._ask(flat)
+                self.session.let_go()
+                self.session.ask(flat)
             return []
         past, future = (self._past, self._undone) if what == "undo" else (self._undone, self._past)
         if not past:
             return [line(f"there is nothing to {what}")]
-        sheet, wanted, material = past[-1]
+        sheet, there, material = past[-1]
         if sheet is self.sheet:
-            self._ask(wanted)
+            self.session.go_back(there)
         else:
-            self.put(sheet, wanted)
+            self.put(sheet, there=there)
         self.material = material
         past.pop()
         future.append(now)
         self._stroke = None
         return [] if sheet is now[0] else [self.describe()]
-
-    def _ask(self, wanted: Controls) -> None:
-        """Ask for controls and nothing else."""
-        self.session.let_go()
-        self.session.ask(wanted)
 
     def _near(self, what: str, away: NDArray[np.float64]) -> None:
         """Refuse a place (mm from the middle of the flat sheet) from which no sheet comes back as it was."""
@@ -212,7 +220,7 @@ class Desk:
             if what == "scene"
             else "the lines begin flat and may end elsewhere; the scene has the state"
         )
-        return [line(f"{name} is saved; it was reached by way of a snap: {how}")]
+        return [line(f"{name} is saved; it was reached round a snap or by way of a snap: {how}")]
 
     def _paint(self, by: str) -> None:
         if by != "none" and by not in self._colours:
@@ -234,8 +242,7 @@ class Desk:
         wanted = self.session.wanted
         parts = [angle / sheet.full[name] for name, angle in wanted.folds.items()]
         gone = float(np.median(parts)) if parts else 0.0
-        folded = [name for name, kind in sheet.model.mesh.folds.items() if kind != "flat"]
-        names = chains(sheet.model.mesh, folded)
+        names = handled(sheet.model.mesh)
         folds = {name: wanted.folds.get(name, gone * sheet.full[name]) for name in names}
         self.put(sheet, replace(wanted, folds=folds))
 
@@ -252,7 +259,7 @@ class Desk:
 
     def _check(self) -> Json:
         """The same state by a run from flat, on this mesh and on a coarser one: how far it is off."""
-        frame = self.session.rest(20.0)
+        frame = self.session.rest(LONGEST_REST)
         if not any(step.actuations for step in self.session.scene().steps):
             return line("there is nothing to check yet")
         path = trace(self.session.scene(), estimate=True, warn=False)
@@ -285,17 +292,12 @@ class Desk:
     @property
     def fresh(self) -> bool:
         """Whether the window has not got these positions, or not in this colour."""
-        return not self._pictured or any(
-            a is not b for a, b in zip(self._pictured[:2], self._picture(), strict=False)
-        )
+        return self._pictures.fresh(self.frame, self._colours.get(self._colour))
 
     @property
     def untold(self) -> bool:
         """Whether the window does not know where the sheet lies, or that it is at rest there."""
-        return self.fresh or self._pictured[2:] != self._picture()[2:]
-
-    def _picture(self) -> tuple[object, ...]:
-        return self.frame.points, self._colour, self.frame.at_rest, self.frame.note
+        return self._pictures.untold(self.frame, self._colours.get(self._colour))
 
     def _now(self) -> tuple[object, ...]:
         return self.session.wanted, self.sheet
@@ -339,24 +341,11 @@ class Desk:
             whole: with positions; False for the numbers alone, where the window has those.
 
         Returns:
-            see `packed`; after the numbers (n, 3) positions, mm, and (n,) values of the colour.
+            see `Pictures.packed`.
         """
-        frame = self.frame
-        self._pictured = self._picture()
-        arrays: tuple[NDArray[np.float64], ...] = ()
-        if whole:
-            chosen = self._colours.get(self._colour)
-            values = np.zeros(len(frame.points)) if chosen is None else chosen.values(frame.state)
-            self._top, arrays = top_of(values), (frame.points, values)
-        head = {
-            **head_of(frame),
-            "snapped": self._snapped,
-            "left": self.session.left,
-            "top": self._top,
-            "heard": heard,
-        }
+        more: Json = {"snapped": self._snapped, "left": self.session.left, "heard": heard}
         self._snapped = False
-        return packed(head, *arrays)
+        return self._pictures.packed(self.frame, self._colours.get(self._colour), more, whole)
 
     def update(self, budget: float = BUDGET) -> bytes:
         """Work for a while, and the frame that came of it.
@@ -386,6 +375,7 @@ class Desk:
             return None
         if self._finer is None or self._finer[0] != key:
             found = finer(self.sheet.model, frame, going)
+            give_back()  # the factors of its meshes: it may be long until the next wish
             if found is None:
                 return None
             self._finer = key, found
@@ -410,9 +400,35 @@ class Desk:
             values,
         )
 
+    def from_flat(self, going: Callable[[], bool]) -> FromFlat | None:
+        """Whether the state that is shown is where a run from flat ends; where it is not, its scene brings it along.
+
+        Args:
+            going: asked while it is solved anew; False ends it.
+
+        Returns:
+            None where there is no state at rest, or it was ended.
+        """
+        frame, session = self.frame, self.session
+        if not frame.at_rest:
+            return None
+        if self._flat is None or self._flat[0] is not frame.state:
+            found = from_flat(session, frame, self.sheet.settles, going)
+            if found is None:
+                return None
+            self._flat = frame.state, found
+            if not found.here:
+                session.leave()
+        return self._flat[1]
+
+    def branch(self, going: Callable[[], bool]) -> list[Json]:
+        """What a window is told of `from_flat`; nothing where it is not known."""
+        found = self.from_flat(going)
+        return [] if found is None else [{"kind": "branch", "here": found.here, "said": found.said}]
+
     def describe(self) -> Json:
         """The sheet as a window draws it: flat, with its creases by name; what it had is gone."""
-        self._pictured = ()
+        self._pictures.forget()
         return described(self.sheet, self.session, self.material, self._colours, self._colour)
 
 

@@ -162,7 +162,7 @@ def python_text(sheet: LiveSheet, session: Session) -> str:
         for node, grip in session.wanted.grips.items()
     )
     said = (
-        " It was reached by way of a snap: these lines may end elsewhere; the scene has the state."
+        " It was reached round a snap or by way of a snap: these lines may end elsewhere; the scene has the state."
         * session.left
     )
     return (

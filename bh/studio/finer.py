@@ -138,7 +138,7 @@ def _moved(model: Model, mesh: SheetMesh, state: State, wanted: Controls) -> tup
 def _solve(model: Model, wanted: Controls, shape: Array, going: Callable[[], bool]) -> State | str | None:
     """The equilibrium with controls next to a shape (n, 3); why there is none; None where it was ended."""
     start = replace(wanted, folds=dict.fromkeys(wanted.folds, 0.0))
-    load = LoadStepBuilder(model).build(Step(Way(start, wanted).actuations(model.creases)))
+    load = LoadStepBuilder(model).build(Step(Way(start, wanted).actuations(model)))
     known = formulation(model.formulation)
     system = known.system(model, load, None)
     if not isinstance(system, PlacedSystem):

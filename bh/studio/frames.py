@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from bh.live import Frame, Jaws, Session
 from bh.live.holding import chains
+from bh.model.wide_crease import folding, wide_names
 from bh.scene.folding import MATERIALS
 from bh.studio.colours import Colour
 from bh.studio.exports import FORMATS
 from bh.studio.sheets import LIBRARY, LiveSheet
 from meshes import SheetMesh
+from meshes.wide import STRIP
 
 Array = NDArray[np.float64]
 Json = dict[str, object]
@@ -100,15 +102,18 @@ def creases_of(mesh: SheetMesh) -> list[Json]:
         mesh: of a sheet.
 
     Returns:
-        one each, with edges as pairs of nodes in one list.
+        one each, with edges as pairs of nodes in one list; a wide crease is one, of kind "wide", with both its lines.
     """
+    strips = wide_names(mesh)
     return [
         {
             "name": name,
-            "fold": mesh.folds.get(name, "flat"),
-            "edges": np.asarray(mesh.crease_edges(name)).ravel().tolist(),
+            "fold": "wide" if name in strips else mesh.folds.get(name, "flat"),
+            "edges": np.asarray(mesh.edge_sets[STRIP + name] if name in strips else mesh.crease_edges(name))
+            .ravel()
+            .tolist(),
         }
-        for name in mesh.creases
+        for name in folding(mesh)
     ]
 
 
@@ -125,7 +130,9 @@ def described(
         colour: that it has.
     """
     mesh, model = session.mesh, sheet.model
-    turns = {*session.creases, *(n for n in chains(mesh, list(mesh.creases)) if mesh.folds.get(n) == "flat")}
+    flat = [name for name in folding(mesh) if mesh.folds.get(name) == "flat"]
+    whole = {*chains(mesh, list(mesh.creases))}
+    turns = {*session.creases, *(name for name in flat if name in whole)} - {*wide_names(mesh)}
     creases = [
         {
             **each,

@@ -14,6 +14,7 @@ from bh.live import Frame
 from bh.model.model import Model
 from bh.runtime.terminal import say
 from bh.studio.desk import Desk
+from bh.studio.scene_sheets import SCENE, of_scene
 from bh.studio.server import Studio
 from bh.studio.sheets import LIBRARY, LONGEST, LiveSheet, of_file, of_library, of_model
 
@@ -124,7 +125,8 @@ def opened(
     """Open the window on a sheet: `bh.studio(model)`.
 
     Args:
-        what: a model, whose steps are left out; a drawing; the name of a pattern of the library; None for one of them.
+        what: a model or a scene, whose steps are left out; a drawing; the name of a pattern of the library; None for
+            one of them.
         material: of a drawing or pattern, one of those of `bh fold`.
         port: of this machine; 0 for a free one.
         browser: open it in the browser of this machine; None for yes, but in a notebook, which shows the window itself.
@@ -173,6 +175,8 @@ def sheet_of(what: Model | LiveSheet | Path | str | None, material: str) -> Live
         )
     if str(what) in LIBRARY and not Path(what).exists():
         return of_library(str(what), material)
+    if Path(what).suffix.lower() == SCENE:
+        return of_scene(Path(what))
     return of_file(str(what), read_drawing(what), material)
 
 

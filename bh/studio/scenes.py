@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import tempfile
 from dataclasses import fields
@@ -11,6 +12,7 @@ from pathlib import Path
 from bh.errors import InputError
 from bh.live import Session
 from bh.model.supports import Support
+from bh.model.wide_crease import wide_names
 from bh.paths.path import Path as Trace
 from bh.paths.record import Record, StepOutcome
 from bh.scene.load import parse_scene
@@ -70,7 +72,7 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
     lines = [f"# {sheet.name} as it stood in bh studio; mm, N, rad."]
     lines += (
         [
-            "# It was reached by way of a snap, so that a run from flat may end elsewhere. The state is saved beside:",
+            "# It was reached round a snap or by way of a snap: a run from flat may end elsewhere. It is kept beside:",
             f"#     bh run {stem}.toml --resume",
             "# begins there, and its second step solves it anew. `bh run --force` begins flat.",
         ]
@@ -127,8 +129,11 @@ def _crease_lines(session: Session) -> list[str]:
 
 
 def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
-    rows = []
+    rows, strips = [], wide_names(session.mesh)
     for name, wanted in session.wanted.folds.items():
+        if name in strips:
+            rows.append(f"  {{ crease = {quoted(name)}, rest = {math.pi - wanted!r} }},")
+            continue
         angle = sheet.sense(name) * wanted + 0.0  # without -0.0
         spring = _stiffness(session, name)
         rows.append(f"  {{ crease = {quoted(name)}, by = {angle!r}{', ' if spring else ''}{spring} }},")

@@ -8,26 +8,24 @@ import json
 import secrets
 import threading
 import time
-import webbrowser
 from collections.abc import Coroutine, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import tornado.web
 import tornado.websocket
 from tornado.httpserver import HTTPServer
-from tornado.netutil import bind_sockets
 from tornado.websocket import WebSocketClosedError
 
 from bh.errors import InputError
 from bh.runtime.memory import give_back
 from bh.runtime.terminal import say
 from bh.studio.desk import Desk
+from bh.studio.door import HOST, Door
 from bh.studio.messages import read
 from bh.studio.sheets import LONGEST, LiveSheet
 
-HOST = "127.0.0.1"
 STATIC = Path(__file__).with_name("static")
 LONGEST_MESSAGE = LONGEST * 4 // 3 + 4096  # bytes of a file in base64, and its name
 LONGEST_REQUEST = 65_536  # bytes of a request's body; no page takes one
@@ -36,6 +34,7 @@ WINDOWS = 8  # at once
 QUIET = 0.4  # s without a wish before a finer mesh is begun
 CALM = 0.1  # s without a word of the browser before the stability of what was reached is counted
 TELLS = 0.3  # s, after which a window is told that the way takes longer
+LINGERS = 1.0  # s behind the end of a window, after which its memory goes back
 POLICY = (
     "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self' ws:"
 )
@@ -61,6 +60,7 @@ class Studio:
         """A new token."""
         self.token = secrets.token_urlsafe(16)
         self.sheet = sheet
+        self._first: Future[Desk] | None = None  # of the window that is waited for
         self.windows: dict[Window, None] = {}  # in the order in which they were opened
         self.tasks: set[asyncio.Task[None]] = set()
         self.pool = ThreadPoolExecutor(2 * WINDOWS, thread_name_prefix="bh-studio")
@@ -77,11 +77,12 @@ class Studio:
             websocket_max_message_size=LONGEST_MESSAGE,
         )
 
-    def serve(self, port: int = 0) -> tuple[HTTPServer, str]:
+    def serve(self, port: int = 0, door: Door | None = None) -> tuple[HTTPServer, str]:
         """Listen on this machine.
 
         Args:
             port: 0 for a free one.
+            door: that is open already, whose token is taken; None for a new one.
 
         Returns:
             the server and the address with its token.
@@ -89,15 +90,24 @@ class Studio:
         Raises:
             InputError: the port is taken.
         """
-        try:
-            sockets = bind_sockets(port, address=HOST)
-        except OSError as error:
-            raise InputError(
-                f"port {port} cannot be used ({error.strerror}); leave --port out for a free one"
-            ) from error
+        door = door or Door.opened(port, self.token)
+        self.token = door.token
         server = HTTPServer(self.application(), max_body_size=LONGEST_REQUEST)
-        server.add_sockets(sockets)
-        return server, f"http://{HOST}:{sockets[0].getsockname()[1]}/?token={self.token}"
+        server.add_sockets(door.sockets)
+        return server, door.address
+
+    def prepare(self) -> None:
+        """Begin with the desk of the first window before it is there: its browser has to start besides."""
+        self._first = self.pool.submit(Desk, self.sheet)
+
+    def desk(self) -> Desk:
+        """A desk for a window.
+
+        Raises:
+            InputError: the sheet cannot be handled.
+        """
+        first, self._first = self._first, None
+        return Desk(self.sheet) if first is None else first.result()
 
     async def close(self, server: HTTPServer) -> None:
         """End the server, its windows and their work, which is waited for.
@@ -202,7 +212,8 @@ class Window(tornado.websocket.WebSocketHandler):
         for task in self.tasks:
             task.cancel()
         self.desk = None
-        give_back()
+        # a thread may be in the middle of an iteration, and holds the desk until that ends
+        asyncio.get_running_loop().call_later(LINGERS, give_back)
 
     def _begin(self, work: Coroutine[None, None, None]) -> None:
         """A task that ends with the window, and that the server waits for when it ends."""
@@ -219,7 +230,7 @@ class Window(tornado.websocket.WebSocketHandler):
     async def _work(self) -> None:
         run = asyncio.get_running_loop().run_in_executor
         try:
-            desk = self.desk = await run(self.studio.pool, Desk, self.studio.sheet)
+            desk = self.desk = await run(self.studio.pool, self.studio.desk)
         except InputError as error:
             await self._say({"kind": "line", "text": str(error), "bad": True})
             return
@@ -309,6 +320,10 @@ class Window(tornado.websocket.WebSocketHandler):
             return
         if found is not None and going.is_set():
             await self.write_message(found, binary=True)
+        run = asyncio.get_running_loop().run_in_executor
+        for answer in await run(self.studio.pool, desk.branch, going.is_set):
+            if going.is_set():
+                await self._say(answer)
 
     async def _do(self, desk: Desk, message: str | bytes) -> None:
         """One message, answered; the last good state is kept where it cannot be done."""
@@ -367,24 +382,29 @@ def _fault(error: Exception) -> dict[str, object]:
     return {"kind": "line", "text": text, "bad": True}
 
 
-def open_window(sheet: LiveSheet | None = None, port: int = 0, browser: bool = True) -> None:
+def open_window(
+    sheet: LiveSheet | None = None, port: int = 0, browser: bool = True, door: Door | None = None
+) -> None:
     """Serve the window until it is interrupted.
 
     Args:
         sheet: that it begins with; None for a pattern of the library.
         port: 0 for a free one.
         browser: open it in the browser of this machine.
+        door: that is open already; None for a new one.
 
     Raises:
         InputError: the port is taken.
     """
+    door = door or Door.opened(port)
+    if browser:
+        door.show()
 
     async def run() -> None:
         studio = Studio(sheet)
-        server, address = studio.serve(port)
+        studio.prepare()
+        server, address = studio.serve(door=door)
         say(f"the window is at {address} (Ctrl-C ends it)")
-        if browser:
-            webbrowser.open(address)
         try:
             await asyncio.Event().wait()
         finally:

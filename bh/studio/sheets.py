@@ -19,20 +19,16 @@ from bh.model.actuations import Fold
 from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model
 from bh.model.sheet import Sheet
+from bh.model.wide_crease import wide_names
 from bh.scene.folding import MATERIALS, PERCENT, Wish, proposals
 from bh.scene.load import Outputs, Scene, parse_scene
 from bh.solvers.settling import Settling
+from bh.studio.library import LIBRARY as LIBRARY
 from meshes import SheetMesh
 from meshes.pattern import FoldKind
 
 LONGEST = 5_000_000  # bytes of a drawing
 MOST_TRIANGLES = 8000  # of a sheet that is to answer at once
-LIBRARY: Mapping[str, str] = {
-    "arc": 'kind = "annulus_sector"\nradius = 100.0\nwidth = 25.0\nangle = 1.5708',
-    "pleats": 'kind = "annulus_sector"\nradius = [60.0, 75.0, 90.0]\nwidth = 15.0\nangle = 1.2\n'
-    'fold = ["mountain", "valley", "mountain"]',
-    "strip": 'kind = "strip"\nlength = 120.0\nwidth = 60.0\ncreases = [20.0, 40.0]\nfold = ["mountain", "valley"]',
-}
 BARS, BENT = "bars-and-hinges", "consistent"
 ODD = re.compile(r"[^\w .()+,=@~-]")
 ALONG, ROWS = 24, 3  # cells of the library's patterns
@@ -67,7 +63,16 @@ class LiveSheet:
     values: Mapping[str, float | Sequence[float]] = field(default_factory=dict)
 
     def of(self, sheet: Sheet) -> LiveSheet:
-        """The same pattern of another material."""
+        """The same pattern of another material.
+
+        Raises:
+            InputError: it has wide creases, whose strips were made of the sheet that it is.
+        """
+        strips = wide_names(self.model.mesh)
+        if strips:
+            raise InputError(
+                f"the strip of crease '{strips[0]}' was made for this sheet; give the material in the scene"
+            )
         return replace(self, model=replace(self.model, sheet=sheet))
 
     def sprung(self, crease: str, Lstar: float | None) -> LiveSheet:
@@ -172,7 +177,7 @@ def of_library(
     young, nu, t, _ = material_of(material)
     step = '[[steps]]\nfold = { crease = "all", by = 0.5 }\n'
     scene = parse_scene(f"{tables}\n[sheet]\nE = {young}\nnu = {nu}\nt = {t}\n\n{step}", name=name)
-    return replace(_live(name, scene, tables, ()), values={**known, **(values or {})})
+    return replace(live(name, scene, tables, ()), values={**known, **(values or {})})
 
 
 def parameters(name: str) -> dict[str, float | list[float]]:
@@ -203,6 +208,8 @@ def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
         raise InputError(f"'{name}' is longer than {LONGEST // 10**6} MB; fold it by `bh fold`")
     plain = plain_name(name)
     material_of(material)
+    if plain.lower().endswith(".toml"):  # it may name Python to be run, so that nobody but a command opens it
+        raise InputError(f"'{plain}' is a scene: open it by `bh studio {plain}`")
     with tempfile.TemporaryDirectory(prefix="bh-studio-") as place:
         file = Path(place) / plain
         file.write_bytes(data)
@@ -222,7 +229,7 @@ def of_file(name: str, data: bytes, material: str = "card") -> LiveSheet:
                 )
                 continue
             tables = _tables(offer.text)
-            return replace(_live(plain, scene, tables, offer.assumed), drawing=(plain, data))
+            return replace(live(plain, scene, tables, offer.assumed), drawing=(plain, data))
     raise failed or InputError(f"'{plain}': no mesh of it can be made; see `bh check`")
 
 
@@ -247,7 +254,7 @@ def of_model(model: Model, name: str = "model") -> LiveSheet:
         model: its steps are left out.
         name: to be shown.
     """
-    return _live(name, Scene(model, Outputs()), "", ())
+    return live(name, Scene(model, Outputs()), "", ())
 
 
 def material_of(name: str) -> tuple[float, float, float, str]:
@@ -261,8 +268,15 @@ def material_of(name: str) -> tuple[float, float, float, str]:
     return MATERIALS[name]
 
 
-def _live(name: str, scene: Scene, tables: str, assumed: tuple[str, ...]) -> LiveSheet:
-    """The scene's model with the springs of its steps as crease laws, and how far each crease goes."""
+def live(name: str, scene: Scene, tables: str, assumed: tuple[str, ...]) -> LiveSheet:
+    """The scene's model with the springs of its steps as crease laws, and how far each crease goes.
+
+    Args:
+        name: to be shown.
+        scene: of the sheet.
+        tables: that it comes out with.
+        assumed: what to tell first, one line each.
+    """
     model = scene.model
     laws = dict(model.creases)
     for step in model.steps:
@@ -273,9 +287,14 @@ def _live(name: str, scene: Scene, tables: str, assumed: tuple[str, ...]) -> Liv
                     if model.mesh.folds.get(crease) != "flat":
                         laws.setdefault(crease, CreaseLaw(item.Lstar, item.stiffness))
     model = replace(model, creases=laws, steps=())
-    said = tuple(str(remark) for remark in remarks(model))
+    said = (*map(_strip_said, wide_names(model.mesh)), *(str(remark) for remark in remarks(model)))
     settles = isinstance(scene.strategy, Settling)
     return LiveSheet(name, model, _full(model.mesh), tables, (*assumed, *said), settles=settles)
+
+
+def _strip_said(name: str) -> str:
+    """A wide crease, told."""
+    return f"crease '{name}' is a strip: its slider turns the angle at which it is at rest, mountain positive"
 
 
 def _full(mesh: SheetMesh) -> dict[str, float]:
@@ -285,7 +304,7 @@ def _full(mesh: SheetMesh) -> dict[str, float]:
         drawn = np.abs(np.asarray(mesh.fold_angles.get(name, [math.nan])))
         known = drawn[~np.isnan(drawn)]
         found[name] = float(known.mean()) if len(known) else math.pi
-    return found
+    return {**found, **dict.fromkeys(wide_names(mesh), math.pi)}
 
 
 def _tables(text: str) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.unit.browsers import opened
+from tests.unit.fold_objects import Read, reader
 
 
 @pytest.fixture(scope="module")
@@ -34,3 +36,9 @@ def window(chromium: Any, address: str) -> Iterator[Any]:
     found = Visit(chromium, address)
     yield found
     found.context.close()
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Read:
+    """Reads a FOLD object."""
+    return reader(tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,14 @@ from bh import LoadControl, Model, ModelError, Sheet, trace
 from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.mechanics.consistent.system import ConsistentSystem
 from bh.mechanics.shared.rigid_contact import RigidContact
-from bh.model.actuations import Indenter, Tether
+from bh.model.actuations import Indenter, Pull, Tether
 from bh.paths.path import Path
+from fem.outside import ShellOutside
+from fem.system import ShellSystem
 
 SHEET = Sheet(E=4000.0, t=0.381)
 FORMULATIONS = ["bars-and-hinges", "consistent"]
+SHELLS = ["shell", "linear-shell"]
 SPAN, WIDTH = 50.0, 5.0
 
 
@@ -47,7 +51,7 @@ def rig(
     ]
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("formulation", [*FORMULATIONS, *SHELLS])
 def test_beam_on_two_supports(formulation: str) -> None:
     """F = 48 E I delta / L^3 with nu = 0; supports and bar push back in balance."""
     path = trace(
@@ -69,7 +73,7 @@ def test_beam_on_two_supports(formulation: str) -> None:
     assert end["left"][0] == pytest.approx(-end["right"][0], rel=1e-6)
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("formulation", [*FORMULATIONS, "shell"])
 def test_reactions_carry_what_presses_on_held_nodes(formulation: str) -> None:
     """One bar presses on nodes that a support holds, another beside them: reactions and bars are in balance."""
     about: dict[str, Any] = {
@@ -120,24 +124,26 @@ def test_work_of_the_bar_is_the_energy_of_sheet_and_barriers() -> None:
     assert path[-1].energy.total < gained
 
 
-def shaken(formulation: str, seed: int) -> tuple[BarsAndHingesSystem | ConsistentSystem, np.ndarray, float]:
+Shaken = BarsAndHingesSystem | ConsistentSystem | ShellSystem
+
+
+def shaken(formulation: str, seed: int, by: float = 0.1) -> tuple[Shaken, np.ndarray, float]:
     """A folded piece of sheet deep in a slanted bar: rounded edges, flat sides and tethers all act."""
     mesh = meshes.structured(meshes.annulus_sector(20.0, 6.0, 0.6), along=6)
     model = Model(mesh, SHEET, formulation=formulation).support("corner:inner-start", [[1.0, 0.5, 0.2]])
     bar = Indenter("bar", (19.0, 5.0, 0.6), 0.7, 4.0, 1.5, 0.5, by=(0.3, -0.2, -0.5), tilt=0.1, gap=0.4)
     model = model.crease("crease", Lstar=25.0).step(bar, Tether("edge:start", (0.5, 1.0, 2.0)))
     system = Path(model).system(0)
-    assert isinstance(system, BarsAndHingesSystem | ConsistentSystem)
-    q = system.start() + 0.1 * np.random.default_rng(seed).normal(size=system.size)
+    assert isinstance(system, Shaken)
+    q = system.start() + by * np.random.default_rng(seed).normal(size=system.size)
     return system, q, 0.4
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("formulation", [*FORMULATIONS, *SHELLS])
 def test_derivatives(formulation: str) -> None:
     """Gradient, Hessian, rate with lambda and power against central differences."""
-    system, q, lam = shaken(formulation, 3)
-    assert system.outside is not None
-    assert np.abs(system.outside.contact_forces(system.positions(q, lam), lam)["bar"]).max() > 1.0
+    system, q, lam = shaken(formulation, 3, 0.02 if formulation in SHELLS else 0.1)
+    assert np.abs(bar_forces(system, q, lam)["bar"]).max() > 1.0
     now, h = system.evaluate(q, lam), 1e-6
     matrix = system.tangent(q, lam, now.forces).matrix
     rng = np.random.default_rng(5)
@@ -190,9 +196,39 @@ def test_bad_bars(change: dict[str, object], message: str) -> None:
         Indenter(**{**good, **change})  # type: ignore[arg-type]
 
 
-def test_the_shell_has_no_bars() -> None:
-    with pytest.raises(ModelError, match="no bars and pulls"):
-        trace(beam("shell").step(*rig(by=1.0)))
+def bar_forces(system: Shaken, q: np.ndarray, lam: float) -> dict[str, np.ndarray]:
+    """Of the outside of a system, whosever it is."""
+    outside = system.outside
+    if isinstance(outside, ShellOutside):
+        assert isinstance(system, ShellSystem)
+        return outside.bar_forces(system.at(q, lam).x, lam)
+    assert outside is not None
+    return outside.contact_forces(system.positions(q, lam), lam)
+
+
+def test_the_shell_presses_as_the_judged_do() -> None:
+    """A folded strip under a bar across its ridge: the same force by two formulations that share nothing of it."""
+    about: dict[str, Any] = {"azimuth": 0.5 * math.pi, "width": 6.0, "height": 6.0, "radius": 3.0}
+    found = []
+    for formulation in ("consistent", "shell"):
+        mesh = meshes.structured(meshes.strip(40.0, 20.0, [10.0]), along=16, rows=4, kind="mirrored")
+        model = Model(mesh, Sheet(E=4000.0, nu=0.3, t=0.2), formulation=formulation, contact=False)
+        model = (
+            model.support("edge:inner", "xyz").support("edge:outer", "xz").fold("crease", by=1.0, Lstar=25.0)
+        )
+        top = float(trace(model)[-1].crease_points("crease")[:, 2].max())
+        bar = Indenter("bar", (20.0, 10.0, top + 3.1), by=(0.0, 0.0, -1.1), stiffness=10.0, **about)
+        found.append(trace(model.step(bar)).require()[-1].contact_forces["bar"])
+    assert found[1][2] < -0.1
+    assert found[0] == pytest.approx(found[1], rel=0.05, abs=1e-3)
+
+
+def test_what_the_shell_has_not() -> None:
+    with pytest.raises(ModelError, match="no moulds and pulls"):
+        trace(beam("shell").step(Pull(3, (0.0, 0.0, 1.0), 0.1)))
+    rough = [replace(bar, friction=0.2) for bar in rig(by=1.0) if isinstance(bar, Indenter)]
+    with pytest.raises(ModelError, match="no friction"):
+        trace(beam("shell").step(*rough))
 
 
 def test_paths_go_on_from_others() -> None:

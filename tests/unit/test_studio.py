@@ -5,11 +5,13 @@ from __future__ import annotations
 import ast
 import asyncio
 import base64
+import gc
 import io
 import json
 import struct
 import sys
 import tomllib
+import weakref
 import zipfile
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
@@ -391,10 +393,13 @@ def test_windows_have_sheets_of_their_own_and_give_them_back() -> None:
             lines += [json.loads(message)] if isinstance(message, str) else []
         assert "cannot be asked" in lines[0]["text"]
         assert len(studio.windows) == 2
+        desks = [weakref.ref(window.desk) for window in studio.windows if window.desk is not None]
+        assert len(desks) == 2
         one.close()
         two.close()
-        while studio.windows:
+        while studio.windows or any(desk() for desk in desks):
             await asyncio.sleep(0.01)
+            gc.collect()
 
     talk(visit)
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import socket
 import subprocess
 import sys
 import textwrap
+import time
 import urllib.error
 import urllib.request
 from importlib import import_module
@@ -19,6 +22,8 @@ import tornado.websocket
 
 import bh
 from bh.errors import InputError
+from bh.studio import door
+from bh.studio.door import HOST, Door
 from bh.studio.opening import Opened, sheet_of
 from bh.studio.sheets import of_library
 from tests.unit.test_notebooks import executed
@@ -116,3 +121,52 @@ def test_a_notebook_shows_the_window_as_a_frame_and_goes_on(tmp_path: Path) -> N
     assert "token=" in first["text/html"]
     assert second["text/plain"] == "(True, 1)"
     assert "was closed" in third["text/html"]
+
+
+def test_a_browser_that_came_before_the_program_is_told_why_there_is_no_window(tmp_path: Path) -> None:
+    """It starts while the drawing is read; who asks with the token gets the line that the terminal has."""
+    drawing, browser, page = (tmp_path / name for name in ("none.svg", "browser.py", "page"))
+    drawing.write_text("no drawing")
+    browser.write_text(
+        textwrap.dedent(f"""
+        import sys, urllib.error, urllib.request
+        try:
+            urllib.request.urlopen(sys.argv[1])
+        except urllib.error.HTTPError as error:
+            open("{page}.part", "wb").write(error.read())
+            import os
+            os.rename("{page}.part", "{page}")
+        """)
+    )
+    done = subprocess.run(
+        [Path(sys.executable).with_name("bh"), "studio", drawing],
+        env={**os.environ, "BROWSER": f"{sys.executable} {browser} %s &"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2
+    for _ in range(200):
+        if page.exists():
+            break
+        time.sleep(0.02)
+    told = page.read_text()
+    assert told.startswith("bh studio: ")
+    assert told.endswith("save the drawing as SVG again")
+    assert done.stderr.rstrip().endswith(told.split(": ", 2)[2])
+
+
+def test_a_door_that_nobody_has_come_to_is_closed_and_tells_nothing_without_the_token(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(door, "PATIENCE", 0.1)
+    Door.opened().refuse("nobody hears this")
+    one = Door.opened()
+    port = one.sockets[0].getsockname()[1]
+    with socket.create_connection((HOST, port)) as stranger:
+        stranger.sendall(b"GET /?token=guessed HTTP/1.1\r\n\r\n")
+        one.refuse("a secret")
+        assert stranger.recv(100) == b""
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection((HOST, port))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path as FilePath
 from types import SimpleNamespace
 from typing import Any
@@ -15,9 +16,10 @@ import meshes
 from bh import Model, ModelError, Sheet, Until, trace
 from bh.formulations.observables import depth_of, measure
 from bh.formulations.state import State
+from bh.paths.record import Record
 from bh.scene.load import parse_scene
 from bh.solvers.outcome import Outcome
-from bh.solvers.points import Increment
+from bh.solvers.points import NOT_STABLE, Increment
 from bh.solvers.walk import Walk, _until, walk
 
 SHEET = Sheet(E=4000.0, t=0.381)
@@ -280,3 +282,33 @@ def test_a_target_that_is_not_stable_is_walked_to_in_shorter_increments(
 
     monkeypatch.setattr("bh.solvers.walk.locate_zero", zero)
     assert [each.point.lam for each in walk(Steps(at_bifurcation).task())] == pytest.approx(found)
+
+
+@pytest.mark.parametrize(
+    ("shortest", "said"),
+    [
+        (1.0, "the state at the value that ends the step is not stable (2 negative modes"),
+        (0.2, ""),  # stable once it is walked to in shorter increments
+    ],
+)
+def test_a_target_that_stays_unstable_is_told(
+    shortest: float, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also of a step that is not the last, of which nothing else tells."""
+
+    def zero(system: Any, a: Any, b: Any, *_: Any) -> Any:
+        return Steps.at(0.35, negative=2 if shortest == 1.0 or b.lam - a.lam > shortest else 0), 0.0, 2
+
+    monkeypatch.setattr("bh.solvers.walk.locate_zero", zero)
+    *before, last = walk(Steps().task())
+    assert all(each.note == "" for each in before)
+    assert last.reached
+    assert last.note == (f"{said}, also in increments 256 times shorter)" if said else "")
+    told = Record(0, 0.35, np.zeros(1), 1, 0.0, 0.0, 0.1, note=last.note)
+    assert told.telling == bool(said)
+
+
+def test_a_path_tells_of_a_step_that_ends_unstable() -> None:
+    path = folded(corrugation(), bh.depth(2.0))
+    path.records[-1] = replace(path.records[-1], note=f"{NOT_STABLE} (1 negative mode)")
+    assert f"step 1: {NOT_STABLE} (1 negative mode)" in path.remarks

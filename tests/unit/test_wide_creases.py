@@ -12,8 +12,12 @@ import pytest
 
 import bh
 import meshes
+from bh.analysis.contact import Panels
 from bh.model.serialise import describe, rebuild
+from bh.plotting.charts import pattern as pattern_chart
 from bh.scene.load import parse_scene
+from bh.scene.report import _figure as report_figure
+from bh.scene.report import report
 from bh.sweep.measures import Measure
 from bh.sweep.scenes import SceneTask
 from meshes.curves import Arc, Line, Polyline, sample
@@ -165,7 +169,11 @@ def test_scene(tmp_path: Path) -> None:
         ('width = "1.5mm"', "width = -1", "creases.crease.width = -1 cannot be"),
         ('width = "1.5mm"', 'width = "1.5kg"', "creases.crease.width"),
         ('width = "1.5mm"', "width = 30", "is 30 mm wide and leaves the sheet"),
-        ("Lstar = 20", "Lstar = 20\nt = 0.1", "has Lstar and t, which say the same"),
+        (
+            "Lstar = 20",
+            "Lstar = 20\nt = 0.1",
+            "creases.crease has Lstar, from which its thickness follows, and t; leave out one",
+        ),
         ("Lstar = 20", "", "needs Lstar or stiffness, or what its strip is made of"),
         ("Lstar = 20", "Lstar = 20\nrest = 2", "unknown key creases.crease.rest"),
         ("creases.crease", "creases.cease", "did you mean 'crease'"),
@@ -232,7 +240,7 @@ def test_a_strip_is_told_once() -> None:
     mesh = mesh_of(meshes.wide_creases(SECTOR, 1.0), 12, 2)
     model, other = bh.Model(mesh, SHEET), bh.Sheet(E=2000.0, t=0.1)
     assert model.wide_crease("crease", sheet=other, stiff=0.5).zones[0].sheet.E == 1000.0
-    with pytest.raises(bh.InputError, match="has Lstar and sheet, which say the same"):
+    with pytest.raises(bh.InputError, match="has Lstar, from which its thickness follows, and sheet;"):
         model.wide_crease("crease", Lstar=20.0, sheet=other)
     with pytest.raises(bh.InputError, match="no wide crease 'no'"):
         model.wide_crease("no", sheet=other)
@@ -267,3 +275,86 @@ def test_patterns_that_cannot() -> None:
     for pattern, width, said in cases:
         with pytest.raises(bh.InputError, match=said):
             meshes.wide_creases(pattern, width)
+
+
+def test_a_strip_in_a_zone_is_in_place_of_that_zone() -> None:
+    """It turns as the sharp crease and the zone's sheet do: a zone of everything is a sheet of that thickness."""
+    mesh = mesh_of(meshes.wide_creases(meshes.strip(20.0, 40.0, [20.0]), 2.0), 4, 2)
+    around = bh.Sheet(E=4000.0, nu=0.3, t=0.3)
+    plain, zoned = bh.Model(mesh, around), bh.Model(mesh, SHEET).zone("all", t=0.3)
+    k = 0.2
+    made = zoned.wide_crease("crease", stiffness=k).zones[1].sheet
+    assert made == plain.wide_crease("crease", stiffness=k).zones[0].sheet
+    assert 2.0 / made.bending_stiffness() == pytest.approx(1.0 / k + 2.0 / around.bending_stiffness())
+    # Lstar is that of the sheet of the model, as of sharp creases
+    by_length = zoned.wide_crease("crease", Lstar=SHEET.bending_stiffness(nu=0.0) / k).zones[1].sheet
+    assert by_length.t == pytest.approx(made.t, rel=1e-12)
+    text = SCENE.replace("[mesh]", '[[zones]]\nwhere = "all"\nt = 0.3\n[mesh]').replace(
+        "Lstar = 20", "stiffness = 0.2"
+    )
+    in_scene = parse_scene(text).model
+    plain = bh.Model(in_scene.mesh, around).wide_crease("crease", stiffness=k)
+    assert in_scene.zones[1].sheet == plain.zones[0].sheet
+
+
+def test_strips_across_zones_and_zones_behind_strips_are_refused() -> None:
+    mesh = mesh_of(meshes.wide_creases(meshes.strip(20.0, 40.0, [20.0]), 2.0), 4, 2)
+    half = [[0.0, 0.0], [10.0, 0.0], [10.0, 40.0], [0.0, 40.0]]
+    model = bh.Model(mesh, SHEET)
+    with pytest.raises(bh.InputError, match="wide crease 'crease' lies in zone 1 and the sheet around it"):
+        model.zone(half, t=0.3).wide_crease("crease", Lstar=20.0)
+    strip = model.wide_crease("crease", Lstar=20.0)
+    with pytest.raises(
+        bh.InputError, match=r"wide crease 'crease' has Lstar or stiffness .*add zones before"
+    ):
+        strip.zone("all", t=0.3)
+    assert strip.zone("all", t=SHEET.t).sections.of is not None
+    assert strip.zone("face:5,5", t=0.3).sections.of is not None
+
+
+def test_messages_name_the_crease_that_was_drawn_and_the_mend() -> None:
+    pattern = meshes.wide_creases(meshes.strip(60.0, 30.0, [10.0, 20.0]), {"crease-1": 2.0})
+    with pytest.raises(bh.InputError, match="19 mm wide and meets crease 'crease-1', which is wide, too;"):
+        meshes.wide_creases(pattern, {"crease-2": 19.0})
+    mesh = mesh_of(pattern, 8, 1)
+    with pytest.raises(bh.InputError, match=r"no crease 'no'; its creases: crease-1, crease-2$"):
+        mesh.crease_edges("no")
+    with pytest.raises(
+        bh.InputError, match="'crease-1' has a width, so it is a strip, not a line: fold it by rest"
+    ):
+        bh.trace(bh.Model(mesh, SHEET).step(bh.Moment("crease-1", 0.1)))
+    model = bh.Model(mesh, SHEET).wide_crease("crease-1", Lstar=20.0)
+    with pytest.raises(
+        bh.InputError, match="'crease-1' has Lstar, but crease 'crease-1' is a strip: leave Lstar out"
+    ):
+        bh.trace(model.fold("crease-1", rest=2.5, Lstar=5.0))
+    with pytest.raises(bh.InputError, match=r"'all' has Lstar, but .* lines for each of them .creases.NAME"):
+        bh.trace(model.fold("all", rest=2.5, Lstar=5.0))
+    with pytest.raises(bh.InputError, match="'all' has by, but crease 'crease-1' is a strip"):
+        bh.trace(model.fold("all", by=0.5))
+    with pytest.raises(bh.InputError, match="has Lstar and stiffness, which are two ways"):
+        model.wide_crease("crease-1", Lstar=20.0, stiffness=1.0)
+
+
+def test_reports_tell_wide_creases_by_their_own_name() -> None:
+    """The two lines that stand for one are no creases that somebody drew."""
+    scene = parse_scene(two("[creases.crease-1]\nwidth = 2\nLstar = 20\n[creases.crease-2]\nLstar = 5"))
+    mesh = scene.model.mesh
+    lines = report(scene)
+    assert "crease crease-1: a strip, 60 mm long and 2 mm wide" in lines
+    assert not any("-left" in line or "-right" in line for line in lines)
+    assert "2 creases" in repr(mesh)
+    assert "2 creases" in repr(scene.model)
+    panels = Panels.of(mesh)
+    named = [panels.name(i).partition(" (")[2] for i in range(len(panels.creases))]
+    assert sorted(named) == [
+        "at crease-1)",
+        "at crease-2)",
+        "between crease-1 and crease-2)",
+        "strip of crease-1)",
+    ]
+    legend = pattern_chart(scene.model).axes[0].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["wide crease", "mountain crease"]
+    labels = [text.get_text() for text in report_figure(scene).legends[0].get_texts()]
+    assert labels == ["boundary", "wide crease", "mountain"]

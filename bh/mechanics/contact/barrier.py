@@ -74,7 +74,8 @@ class SheetBarrier:
         """What presses among the parts of a collision mesh, whose first nodes are those of the sheet."""
         self.offset, self.reach, self._mesh = offset, reach, solid
         self._partner = partners(mesh)
-        self._potential = ipctk.BarrierPotential(reach, pressure, True)
+        self._pressure = pressure
+        self.harden(1.0)
         slack = max(reach, SLACK * float(np.median(mesh_edges(mesh))))
         self._detection = Detection(self._mesh, offset, offset + reach, slack)
         self._last: tuple[Array, ipctk.NormalCollisions] | None = None
@@ -86,6 +87,14 @@ class SheetBarrier:
         """What it has taken so far, s of one core of 2.5 GHz, counted by its work: the same on every machine."""
         found = self._detection
         return found.searches * SEARCHED * len(self.triangles) + found.looks * DETECTED + self._built
+
+    def harden(self, factor: float) -> None:
+        """Press by a number of times what the model asks for, until told otherwise.
+
+        Args:
+            factor: 1 for the model's own.
+        """
+        self._potential = ipctk.BarrierPotential(self.reach, factor * self._pressure, True)
 
     def _intersects(self, x: Array) -> bool:
         self._detection.searches += 1
@@ -150,6 +159,10 @@ class SheetBarrier:
         if len(pairs) == 0:
             return self.offset + self.reach
         return float(np.sqrt(pairs.compute_minimum_distance(self._mesh, x)))
+
+    def room(self, x: Array) -> float:
+        """Part of the reach that is left to the pair that presses hardest at positions x; 1 where none does."""
+        return (self.distance(x) - self.offset) / self.reach
 
     def presses(self, x: Array) -> bool:
         """Are any parts within the reach of each other at positions x?"""

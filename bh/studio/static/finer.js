@@ -4,13 +4,17 @@ import { lay, move, redrawSoon } from "./view.js";
 import { scale } from "./panel.js";
 
 let shown = false, said = "", coarse = null;
+let flat = null; // where a run from flat ends, of the state that is shown
 let held = false, last = null; // a hand is on the sheet; the newest finer frame, which it has put off
 
 // A frame of the coarse mesh: what is seen from now on.
 export function seenCoarse(values) {
   if (shown) lay(now.sheet);
-  coarse = values; shown = false; said = ""; last = null;
+  coarse = values; shown = false; said = ""; last = null; flat = null;
 }
+
+// It lies as it did, and what was found of it beside the frames is found anew.
+export function seenAgain() { back(); said = ""; last = null; flat = null; }
 
 // Back to the coarse mesh at once: a point is taken, or a slider moved. Where an answer comes soon it is seen instead.
 export function back(answered = false) {
@@ -19,7 +23,7 @@ export function back(answered = false) {
   if (answered) redrawSoon();
   shown = false; said = ""; badge();
 }
-whenAsked((message) => { const moves = MOVES.includes(message.do); back(moves); if (moves) { said = ""; badge(); } });
+whenAsked((message) => { const moves = MOVES.includes(message.do); back(moves); if (moves) { said = ""; flat = null; badge(); } });
 
 // A hand is on the folded sheet, or off it: what it points at must not become another mesh meanwhile.
 export function hand(on) {
@@ -43,12 +47,19 @@ export function finer(head, floats) {
   $("error").textContent = now.error; $("error").title = now.error;
 }
 
+export function branch(message) {
+  if (!now.head?.rest) return;
+  flat = message; badge();
+  $("flat-run").textContent = message.said;
+}
+
 export function badge() {
   const { head } = now, place = $("badge");
   if (!head) return;
   const rest = head.rest && head.heard === asked; // what was asked since is on its way
   const text = said || (head.note ? `cannot go on: ${head.note}` : head.snapped ? "snapped" : rest ? "in equilibrium" : "on its way");
-  write(place, text + (head.left && rest && !head.snapped ? ", behind a snap" : ""));
+  const elsewhere = flat && !flat.here ? ", on another branch than a run from flat" : head.left && rest && !head.snapped ? ", behind a snap" : "";
+  write(place, text + elsewhere);
   place.classList.toggle("away-from", !said && (Boolean(head.note) || head.snapped || !rest));
 }
 export const refined = () => shown;

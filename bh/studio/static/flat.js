@@ -15,15 +15,15 @@ export function flat(choose) {
   const path = (pairs) => pairs.map((node, i) => `${i % 2 ? "L" : "M"}${xs[node]} ${ys[node]}`).join("");
   make("path", { d: path(sheet.boundary), class: "outline" }, svg);
   for (const crease of sheet.creases) {
-    if (!crease.turns) { make("path", { d: path(crease.edges), class: "crease" }, make("g", { class: crease.fold }, svg)); continue; }
-    const group = make("g", { class: crease.fold, tabindex: 0, role: "button", "aria-label": `crease ${crease.name}`, "aria-description": `${crease.fold}; keys M, V and F make it a mountain, a valley or flat` }, svg);
+    if (!crease.turns && !crease.handled) { make("path", { d: path(crease.edges), class: "crease" }, make("g", { class: crease.fold }, svg)); continue; }
+    const group = make("g", { class: crease.fold, tabindex: 0, role: "button", "aria-label": `crease ${crease.name}`, "aria-description": crease.turns ? `${crease.fold}; keys M, V and F make it a mountain, a valley or flat` : `${crease.fold}: a strip that bends` }, svg);
     make("title", {}, group).textContent = `${crease.name}, ${crease.fold}`;
     make("path", { d: path(crease.edges), class: "crease" }, group);
     make("path", { d: path(crease.edges), class: "hit" }, group);
     group.dataset.crease = crease.name;
     const pick = () => choose(crease.name);
     group.onclick = pick;
-    group.onkeydown = (e) => { const kind = KEYS[e.key.toLowerCase()]; if (kind && !e.ctrlKey && !e.metaKey) ask({ do: "crease", crease: crease.name, kind }); else onKeys(pick)(e); };
+    group.onkeydown = (e) => { const kind = KEYS[e.key.toLowerCase()]; if (kind && crease.turns && !e.ctrlKey && !e.metaKey) ask({ do: "crease", crease: crease.name, kind }); else onKeys(pick)(e); };
     group.onpointerenter = () => light(crease.name, true); group.onpointerleave = () => light(crease.name, false);
   }
   const rim = [...new Set(sheet.boundary)], step = Math.max(1, Math.ceil(rim.length / 60));

@@ -91,7 +91,7 @@ export function scale(top) {
 
 export function numbers() {
   const { head, sheet } = now, { energy } = head;
-  const rows = [["Energy", `${number(energy.total)} N mm`], ["of bending", `${number(energy.bending)} N mm`], ["of stretching", `${number(energy.stretching)} N mm`], ["of creases", `${number(energy.folding)} N mm`], ["Stable", head.stable === null ? "not known" : head.stable ? "yes" : "no"], ["Largest strain", `${number(100 * head.strain)} %`], ["Mesh", `${sheet.triangles.length / 3} triangles, ${sheet.formulation}`], ["Error of the energy", "not looked at", "error"], ["Panels", sheet.contact ? "stop each other" : "not looked at", "meets"], ["Solved in", `${head.ms.toFixed(0)} ms`]];
+  const rows = [["Energy", `${number(energy.total)} N mm`], ["of bending", `${number(energy.bending)} N mm`], ["of stretching", `${number(energy.stretching)} N mm`], ["of creases", `${number(energy.folding)} N mm`], ["Stable", head.stable === null ? "not known" : head.stable ? "yes" : "no"], ["Largest strain", `${number(100 * head.strain)} %`], ["Mesh", `${sheet.triangles.length / 3} triangles, ${sheet.formulation}`], ["Error of the energy", "not looked at", "error"], ["Panels", sheet.contact ? "stop each other" : "not looked at", "meets"], ["A run from flat", "not looked at", "flat-run"], ["Solved in", `${head.ms.toFixed(0)} ms`]];
   const names = Object.keys(head.folds);
   for (const name of names.slice(0, 8)) rows.push([`Fold of ${name}`, degrees(head.folds[name])]);
   table(rows);

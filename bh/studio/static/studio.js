@@ -3,7 +3,7 @@ import { $, ask, asked, connect, drawn, now, save, tell } from "./common.js";
 import { draw, fit, lay, move, picture, seen, smoothUnless, vector } from "./view.js";
 import { letGo, pulls } from "./pull.js";
 import { flat } from "./flat.js";
-import { back, badge, finer, hand, refined, seenCoarse } from "./finer.js";
+import { badge, branch, finer, hand, refined, seenAgain, seenCoarse } from "./finer.js";
 import { history, numbers, oneCrease, panel, slider } from "./panel.js";
 import { remember, saveFilm, saveMoving, savePicture } from "./record.js";
 
@@ -13,6 +13,7 @@ function answer(message) {
   if (message.kind === "sheet") { show(message); if ($("message").textContent.endsWith("...")) tell(""); }
   else if (message.kind === "file") { save(message.name, message.data); tell(`${message.name} is saved.`); }
   else if (message.kind === "line") tell(message.text);
+  else if (message.kind === "branch") branch(message);
 }
 
 function show(sheet) {
@@ -40,7 +41,7 @@ function frame(buffer) {
     move(now.points, values, head.top);
     picture(); // not when the browser draws next: where that is slow, it is so because of the picture before
     if (drawing) drawing = 2; else { drawing = 1; drawn(); requestAnimationFrame(rested); }
-  } else { back(); drawn(); }
+  } else { seenAgain(); drawn(); }
   badge(); said();
   remember(head);
 }

@@ -1,0 +1,87 @@
+"""The address of a server that is not there yet: the browser starts while the program is still being read.
+
+Connections wait in the queue of the socket until the server takes it over, or until they are told why there is none.
+"""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import threading
+import webbrowser
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bh.errors import InputError
+
+HOST = "127.0.0.1"
+QUEUE = 128  # connections
+PATIENCE = 3.0  # s that a browser has to ask, before the program ends without a window
+LONGEST = 65_536  # bytes of a request that is not served
+
+
+@dataclass(frozen=True)
+class Door:
+    """Sockets that listen on this machine, and the token that lets in.
+
+    Attributes:
+        sockets: that listen.
+        token: part of the address.
+    """
+
+    sockets: Sequence[socket.socket]
+    token: str
+
+    @classmethod
+    def opened(cls, port: int = 0, token: str | None = None) -> Door:
+        """Listen on this machine.
+
+        Args:
+            port: 0 for a free one.
+            token: None for a new one.
+
+        Raises:
+            InputError: the port is taken.
+        """
+        from tornado.netutil import bind_sockets
+
+        try:
+            sockets = bind_sockets(port, address=HOST, backlog=QUEUE)
+        except OSError as error:
+            raise InputError(
+                f"port {port} cannot be used ({error.strerror}); leave --port out for a free one"
+            ) from error
+        return cls(sockets, token or secrets.token_urlsafe(16))
+
+    @property
+    def address(self) -> str:
+        """Of the page, with the token."""
+        return f"http://{HOST}:{self.sockets[0].getsockname()[1]}/?token={self.token}"
+
+    def show(self) -> None:
+        """Open the page in the browser of this machine, which may be slow to start: nobody waits for it here."""
+        threading.Thread(target=webbrowser.open, args=(self.address,), daemon=True).start()
+
+    def refuse(self, why: str) -> None:
+        """Tell the browser that waits why there is no window, and close.
+
+        Args:
+            why: a line.
+        """
+        body = why.encode()
+        head = (
+            "HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain; charset=utf-8\r\n"
+            f"Content-Length: {len(body)}\r\nX-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n"
+        )
+        first = self.sockets[0]
+        first.settimeout(PATIENCE)
+        try:
+            connection, _ = first.accept()
+            with connection:
+                connection.settimeout(PATIENCE)
+                if f"token={self.token} ".encode() in connection.recv(LONGEST).split(b"\r\n")[0]:
+                    connection.sendall(head.encode() + body)
+        except OSError:  # nobody has come, or has gone again
+            pass
+        for each in self.sockets:
+            each.close()
