@@ -54,12 +54,12 @@ function rested() {
 
 smoothUnless(() => now.head && (now.head.heard !== asked || !(now.head.arrived || now.head.note)));
 
-// Numbers and curves at the side: at rest at once, on the way now and then, as each of them is painted anew.
+// Numbers and curves at the side: behind the picture, on the way now and then only, as each of them is painted anew.
 const OFTEN = 250; // ms
-let later = 0;
+let later = 0, written = 0;
 function said() {
   if (now.head.rest || now.head.note) { clearTimeout(later); later = 0; numbers(); }
-  else later ||= setTimeout(() => { later = 0; if (now.head) numbers(); }, OFTEN);
+  else later ||= setTimeout(() => { later = 0; written = performance.now(); if (now.head) numbers(); }, Math.max(0, written + OFTEN - performance.now()));
 }
 
 // ---------------------------------------------------------------- what is clicked
