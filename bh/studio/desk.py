@@ -25,7 +25,8 @@ from bh.studio.branch import FromFlat, from_flat
 from bh.studio.colours import offered, top_of
 from bh.studio.exports import export, film, moving
 from bh.studio.finer import Finer, finer
-from bh.studio.frames import Json, creases_of, described, head_of, line, packed, surface
+from bh.studio.frames import Json, creases_of, described, line, packed, surface
+from bh.studio.pictures import Pictures
 from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
 
 BUDGET = 0.03  # s of an update
@@ -51,10 +52,7 @@ class Desk:
         self._colour = "bending"
         self._shown: tuple[object, ...] = ()
         self._snapped = False  # since the last picture
-        self._pictured: tuple[
-            object, ...
-        ] = ()  # what the window has: positions, colour, whether at rest and why not
-        self._top = 0.0  # of the scale of its colours
+        self._pictures = Pictures()
         self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
         self._flat: tuple[State, FromFlat] | None = None  # a state, and where a run from flat ends
         self._tidied = time.monotonic()
@@ -294,17 +292,12 @@ class Desk:
     @property
     def fresh(self) -> bool:
         """Whether the window has not got these positions, or not in this colour."""
-        return not self._pictured or any(
-            a is not b for a, b in zip(self._pictured[:2], self._picture(), strict=False)
-        )
+        return self._pictures.fresh(self.frame, self._colours.get(self._colour))
 
     @property
     def untold(self) -> bool:
         """Whether the window does not know where the sheet lies, or that it is at rest there."""
-        return self.fresh or self._pictured[2:] != self._picture()[2:]
-
-    def _picture(self) -> tuple[object, ...]:
-        return self.frame.points, self._colour, self.frame.at_rest, self.frame.note
+        return self._pictures.untold(self.frame, self._colours.get(self._colour))
 
     def _now(self) -> tuple[object, ...]:
         return self.session.wanted, self.sheet
@@ -348,24 +341,11 @@ class Desk:
             whole: with positions; False for the numbers alone, where the window has those.
 
         Returns:
-            see `packed`; after the numbers (n, 3) positions, mm, and (n,) values of the colour.
+            see `Pictures.packed`.
         """
-        frame = self.frame
-        self._pictured = self._picture()
-        arrays: tuple[NDArray[np.float64], ...] = ()
-        if whole:
-            chosen = self._colours.get(self._colour)
-            values = np.zeros(len(frame.points)) if chosen is None else chosen.values(frame.state)
-            self._top, arrays = top_of(values), (frame.points, values)
-        head = {
-            **head_of(frame),
-            "snapped": self._snapped,
-            "left": self.session.left,
-            "top": self._top,
-            "heard": heard,
-        }
+        more: Json = {"snapped": self._snapped, "left": self.session.left, "heard": heard}
         self._snapped = False
-        return packed(head, *arrays)
+        return self._pictures.packed(self.frame, self._colours.get(self._colour), more, whole)
 
     def update(self, budget: float = BUDGET) -> bytes:
         """Work for a while, and the frame that came of it.
@@ -448,7 +428,7 @@ class Desk:
 
     def describe(self) -> Json:
         """The sheet as a window draws it: flat, with its creases by name; what it had is gone."""
-        self._pictured = ()
+        self._pictures.forget()
         return described(self.sheet, self.session, self.material, self._colours, self._colour)
 
 

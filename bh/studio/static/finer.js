@@ -13,6 +13,9 @@ export function seenCoarse(values) {
   coarse = values; shown = false; said = ""; last = null; flat = null;
 }
 
+// It lies as it did, and what was found of it beside the frames is found anew.
+export function seenAgain() { back(); said = ""; last = null; flat = null; }
+
 // Back to the coarse mesh at once: a point is taken, or a slider moved. Where an answer comes soon it is seen instead.
 export function back(answered = false) {
   if (!shown) return;
@@ -20,7 +23,7 @@ export function back(answered = false) {
   if (answered) redrawSoon();
   shown = false; said = ""; badge();
 }
-whenAsked((message) => { const moves = MOVES.includes(message.do); back(moves); if (moves) { said = ""; badge(); } });
+whenAsked((message) => { const moves = MOVES.includes(message.do); back(moves); if (moves) { said = ""; flat = null; badge(); } });
 
 // A hand is on the folded sheet, or off it: what it points at must not become another mesh meanwhile.
 export function hand(on) {
@@ -46,19 +49,17 @@ export function finer(head, floats) {
 
 export function branch(message) {
   if (!now.head?.rest) return;
-  flat = message; badge(); flatRun();
+  flat = message; badge();
+  $("flat-run").textContent = message.said;
 }
-
-// Beside the numbers, which are written anew where they tell more.
-export function flatRun() { if (flat) $("flat-run").textContent = flat.said; }
 
 export function badge() {
   const { head } = now, place = $("badge");
   if (!head) return;
   const rest = head.rest && head.heard === asked; // what was asked since is on its way
   const text = said || (head.note ? `cannot go on: ${head.note}` : head.snapped ? "snapped" : rest ? "in equilibrium" : "on its way");
-  const apart = flat && !flat.here ? ", on another branch than a run from flat" : head.left && rest && !head.snapped ? ", behind a snap" : "";
-  write(place, text + apart);
+  const elsewhere = flat && !flat.here ? ", on another branch than a run from flat" : head.left && rest && !head.snapped ? ", behind a snap" : "";
+  write(place, text + elsewhere);
   place.classList.toggle("away-from", !said && (Boolean(head.note) || head.snapped || !rest));
 }
 export const refined = () => shown;

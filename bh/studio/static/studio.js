@@ -3,7 +3,7 @@ import { $, ask, asked, connect, drawn, now, save, tell } from "./common.js";
 import { draw, fit, lay, move, picture, seen, smoothUnless, vector } from "./view.js";
 import { letGo, pulls } from "./pull.js";
 import { flat } from "./flat.js";
-import { back, badge, branch, finer, flatRun, hand, refined, seenCoarse } from "./finer.js";
+import { badge, branch, finer, hand, refined, seenAgain, seenCoarse } from "./finer.js";
 import { asItIs, history, numbers, oneCrease, panel, slider } from "./panel.js";
 import { remember, saveFilm, saveMoving, savePicture } from "./record.js";
 
@@ -41,7 +41,7 @@ function frame(buffer) {
     move(now.points, values, head.top);
     picture(); // not when the browser draws next: where that is slow, it is so because of the picture before
     if (drawing) drawing = 2; else { drawing = 1; drawn(); requestAnimationFrame(rested); }
-  } else { back(); drawn(); }
+  } else { seenAgain(); drawn(); }
   badge(); said();
   remember(head);
 }
@@ -54,12 +54,12 @@ function rested() {
 
 smoothUnless(() => now.head && (now.head.heard !== asked || !(now.head.arrived || now.head.note)));
 
-// Numbers and curves at the side: at rest at once, on the way now and then, as each of them is painted anew.
+// Numbers and curves at the side: behind the picture, on the way now and then only, as each of them is painted anew.
 const OFTEN = 250; // ms
-let later = 0;
+let later = 0, written = 0;
 function said() {
-  if (now.head.rest || now.head.note) { clearTimeout(later); later = 0; numbers(); flatRun(); }
-  else later ||= setTimeout(() => { later = 0; if (now.head) numbers(); }, OFTEN);
+  if (now.head.rest || now.head.note) { clearTimeout(later); later = 0; numbers(); }
+  else later ||= setTimeout(() => { later = 0; written = performance.now(); if (now.head) numbers(); }, Math.max(0, written + OFTEN - performance.now()));
 }
 
 // ---------------------------------------------------------------- what is clicked
