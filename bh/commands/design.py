@@ -442,9 +442,7 @@ def design(
             say(f"{name}: {yes}" if unit == YES_OR_NO else f"{name}: {value:.4g} {unit}")
         if not answer.measure.get(CLEARS, (1.0, ""))[0]:
             say("panels of this strip pass through each other, and no design that was found clears itself:")
-            say(
-                "nothing prevents it here; take other segments, or see where panels stop (docs/inverse_design.md)"
-            )
+            say("nothing prevents it; take other segments, or see where panels stop (docs/inverse_design.md)")
         say(_told(answer.tolerance, answer.region))
         turn = math.degrees(float(np.abs(answer.design.k0 * answer.design.length).sum()))
         say(f"total length {answer.design.total:.1f} mm, the flat crease turns by {turn:.0f} degrees in all")

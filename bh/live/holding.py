@@ -61,6 +61,9 @@ def handled(mesh: SheetMesh) -> list[str]:
 
     Args:
         mesh: of the sheet.
+
+    Returns:
+        chains first.
     """
     drawn = [name for name in mesh.creases if mesh.folds.get(name) != "flat"]
     return [*chains(mesh, drawn), *wide_names(mesh)]

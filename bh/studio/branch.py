@@ -25,6 +25,14 @@ class FromFlat:
     here: bool
     said: str
 
+    def message(self) -> dict[str, object]:
+        """What a window is told.
+
+        Returns:
+            as JSON.
+        """
+        return {"kind": "branch", "here": self.here, "said": self.said}
+
 
 def from_flat(session: Session, frame: Frame, settles: bool, going: Callable[[], bool]) -> FromFlat | None:
     """Fold the sheet anew from flat, in one step, and pull on it in a second one, as its scene does.

@@ -421,11 +421,6 @@ class Desk:
                 session.leave()
         return self._flat[1]
 
-    def branch(self, going: Callable[[], bool]) -> list[Json]:
-        """What a window is told of `from_flat`; nothing where it is not known."""
-        found = self.from_flat(going)
-        return [] if found is None else [{"kind": "branch", "here": found.here, "said": found.said}]
-
     def describe(self) -> Json:
         """The sheet as a window draws it: flat, with its creases by name; what it had is gone."""
         self._pictures.forget()

@@ -25,11 +25,21 @@ class Pictures:
         self._points = None
 
     def fresh(self, frame: Frame, colour: Colour | None) -> bool:
-        """Whether the window lacks the positions of a frame, or their values of a colour."""
+        """Whether the window lacks the positions of a frame, or their values of a colour.
+
+        Args:
+            frame: of a session.
+            colour: of its values; None for none.
+        """
         return self._points is not frame.points or self._colour is not colour
 
     def untold(self, frame: Frame, colour: Colour | None) -> bool:
-        """Whether it does not know where the sheet lies, that it is at rest there, or why it cannot go on."""
+        """Whether it does not know where the sheet lies, that it is at rest there, or why it cannot go on.
+
+        Args:
+            frame: of a session.
+            colour: of its values; None for none.
+        """
         return self.fresh(frame, colour) or self._told != (frame.at_rest, frame.note)
 
     def packed(self, frame: Frame, colour: Colour | None, more: Json, whole: bool) -> bytes:

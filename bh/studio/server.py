@@ -321,9 +321,9 @@ class Window(tornado.websocket.WebSocketHandler):
         if found is not None and going.is_set():
             await self.write_message(found, binary=True)
         run = asyncio.get_running_loop().run_in_executor
-        for answer in await run(self.studio.pool, desk.branch, going.is_set):
-            if going.is_set():
-                await self._say(answer)
+        flat = await run(self.studio.pool, desk.from_flat, going.is_set)
+        if flat is not None and going.is_set():
+            await self._say(flat.message())
 
     async def _do(self, desk: Desk, message: str | bytes) -> None:
         """One message, answered; the last good state is kept where it cannot be done."""

@@ -15,7 +15,7 @@ import numpy as np
 from bh.studio.server import Studio
 from bh.studio.sheets import LiveSheet
 
-PATIENCE = 30_000  # ms
+PATIENCE = 90_000  # ms; a film is drawn by software beside other tests
 DROP = """([name, data]) => {
   const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0)), carried = new DataTransfer();
   carried.items.add(new File([bytes], name));

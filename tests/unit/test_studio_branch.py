@@ -32,7 +32,9 @@ def told(desk: Desk) -> dict[str, Any]:
     """What the window is told of the state at rest."""
     desk.frame = desk.session.rest()
     assert desk.frame.at_rest, desk.frame.note
-    (answer,) = desk.branch(lambda: True)
+    found = desk.from_flat(lambda: True)
+    assert found is not None
+    answer = found.message()
     assert answer["kind"] == "branch"
     return answer
 
@@ -91,7 +93,7 @@ def test_the_branch_of_a_run_is_told_as_such() -> None:
     at = (desk.frame.points[3] + [0.0, 0.0, 4.0]).tolist()
     take(desk, do="pull", node=3, to=at)
     desk.frame = desk.session.rest()
-    assert desk.branch(lambda: False) == []
+    assert desk.from_flat(lambda: False) is None
     assert told(desk)["said"] == "ends here"
     assert not desk.session.left
 
@@ -122,4 +124,4 @@ def test_nothing_is_told_of_a_sheet_on_its_way(asked: int) -> None:
     desk = Desk()
     take(desk, do="percent", value=20.0)
     desk.work(0.0 if asked else 1e-9)
-    assert desk.branch(lambda: True) == []
+    assert desk.from_flat(lambda: True) is None
