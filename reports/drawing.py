@@ -16,10 +16,12 @@ from itertools import pairwise
 WIDTH, HEIGHT = 420, 300  # of a plot, where it is not scaled
 LABEL, TICK, EDGE = 12.0, 11.0, 4.0  # font of labels and of numbers, and the least room at an edge
 ROOM = 0.05  # of the range of values, beside them
+SINGLE = 0.005  # of a value that is the only one: what is shown on either side of it
 MOST_TICKS = 7
 ROUND_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 WIDE, MANY_DECADES = 6.0, 8.0  # of a logarithmic axis: its range from which its numbers are powers; decades
 PLAIN = (1e-4, 1e7)  # numbers that are written without a power of ten
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _NARROW = dict.fromkeys("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", 0.42) | dict.fromkeys(".,·", 0.4)  # widths in em; digits have 0.64
 _SUBSCRIPT = re.compile(r"(?<![\w&])([A-Za-z\u03b1-\u03c9])_([A-Za-z0-9]{1,3})(?!\w)")
 _STAR = [
@@ -107,9 +109,10 @@ def scale(
         power: how a number of a logarithmic axis is written.
     """
     low, high = (min(values), max(values)) if values else ((1.0, 10.0) if log else (0.0, 1.0))
-    span = max(least * max(abs(low), abs(high)), 1e-300)
-    if high - low < span:
-        low, high = 0.5 * (low + high) - span, 0.5 * (low + high) + span
+    size = max(abs(low), abs(high))
+    if high - low <= least * size:
+        half = max(least, SINGLE) * size or 1.0
+        low, high = 0.5 * (low + high) - half, 0.5 * (low + high) + half
     elif log:
         wide, room = high > WIDE * low, (high / low) ** ROOM
         low, high = low / room, high * room
@@ -119,7 +122,7 @@ def scale(
     else:
         low, high = low - ROOM * (high - low), high + ROOM * (high - low)
     ticks = _steps(low, high)
-    return Scale(title, log, low, high, ticks, _written(ticks, power), [])
+    return Scale(title, log, low, high, ticks, _written(ticks), [])
 
 
 def _steps(low: float, high: float) -> list[float]:
@@ -131,17 +134,19 @@ def _steps(low: float, high: float) -> list[float]:
     return [number * step for number in range(first, last + 1)]
 
 
-def _written(ticks: Sequence[float], power: Callable[[float], str]) -> list[str]:
-    """The ticks with as many digits as tell them apart, and a true minus."""
+def _written(ticks: Sequence[float]) -> list[str]:
+    """The ticks with as many digits as tell them apart, a true minus, and one power of ten where they need one."""
     most = max(map(abs, ticks), default=0.0)
-    if most and not PLAIN[0] <= most < PLAIN[1]:
-        return ["0" if at == 0.0 else ("\N{MINUS SIGN}" if at < 0.0 else "") + power(abs(at)) for at in ticks]
-    step = min((b - a for a, b in pairwise(ticks)), default=most or 1.0)
+    power = math.floor(math.log10(most)) if most and not PLAIN[0] <= most < PLAIN[1] else 0
+    parts = [at / 10.0**power for at in ticks]
+    step = min((b - a for a, b in pairwise(parts)), default=max(map(abs, parts), default=0.0) or 1.0)
     digits = next(
-        n for n in range(17) if n == 16 or all(abs(at - round(at, n)) < 1e-6 * step for at in ticks)
+        n for n in range(17) if n == 16 or all(abs(at - round(at, n)) < 1e-6 * step for at in parts)
     )
+    times = f"·10{str(power).translate(RAISED)}" if power else ""
     return [
-        f"{at + 0.0:.{digits}f}".replace("-", "\N{MINUS SIGN}") for at in (round(at, digits) for at in ticks)
+        "0" if power and at == 0.0 else f"{at + 0.0:.{digits}f}".replace("-", "\N{MINUS SIGN}") + times
+        for at in (round(at, digits) for at in parts)
     ]
 
 
