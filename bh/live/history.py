@@ -23,11 +23,13 @@ class Mark:
         controls: what was asked for.
         q: (n,) unknowns of the state at rest with that; None where it had not come to rest, or is too long ago.
         left: it had snapped since it was flat.
+        ways: that it had begun, as of `Session.straight`.
     """
 
     controls: Controls
     q: Array | None = None
     left: bool = False
+    ways: int = 0
 
 
 def lightened(marks: list[Mark], most: int) -> list[Mark]:

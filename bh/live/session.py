@@ -93,12 +93,22 @@ class Session:
 
     @property
     def straight(self) -> bool:
-        """Whether it only went on from flat along one line of fold angles, without a snap, as a run from flat does."""
-        return self._ways <= 1 and not self._left
+        """Whether it only went on from flat along one line of fold angles, without a snap, as a run from flat does.
 
-    def leave(self) -> None:
-        """Note that a run from flat ends on another branch than this: what was found by such a run."""
-        self._left = True
+        One that was folded and pulled at once is not: a run folds first.
+        """
+        both = bool(self._wanted.grips) and any(self._wanted.folds.values())
+        return self._ways <= 1 and not self._left and not both
+
+    def leave(self, state: State) -> None:
+        """Note that a run from flat ends on another branch than a state; not where another one is the newest now.
+
+        Args:
+            state: of a frame, which such a run was compared with.
+        """
+        seen = self._seen
+        if seen is not None and seen[1] is state and seen[0] is self._under.march.here.q:
+            self._left = True
 
     @property
     def newest(self) -> Point:
@@ -192,7 +202,7 @@ class Session:
             self._past.pop()
         if not self._past:
             return False
-        undone = [*self._undone, self.mark()]
+        undone = lightened([*self._undone, self.mark()], REMEMBERED)
         self.go_back(self._past.pop())
         self._undone = undone
         return True
@@ -210,8 +220,8 @@ class Session:
         """Where it is, for `go_back`: what is asked for, and the state if it is at rest with that."""
         here = self._under.march.here
         if self._now() != self._wanted or self._under.fading or self._under.march.unseen:
-            return Mark(self._wanted, left=self._left)
-        return Mark(self._wanted, here.q, self._left)
+            return Mark(self._wanted, None, self._left, self._ways)
+        return Mark(self._wanted, here.q, self._left, self._ways)
 
     def go_back(self, there: Mark) -> None:
         """Ask for what was asked for then, and lie as the sheet lay then; where that is not known it goes there.
@@ -227,7 +237,7 @@ class Session:
         if under is not None:
             self._iterations += self._under.march.iterations
             self._under, self._gone, self._left = under, (), there.left
-            self._ways += 1
+            self._ways = there.ways
 
     def ask(self, wanted: Controls) -> None:
         """Ask for all controls at once, such as those of another session of the same sheet.

@@ -15,8 +15,7 @@ import bh.studio.messages as asked
 from bh.analysis.contact import self_contact
 from bh.errors import InputError
 from bh.formulations.state import State
-from bh.live import Controls, Mark, Session, held
-from bh.live.history import lightened
+from bh.live import Controls, Frame, Mark, Session, held
 from bh.live.holding import handled
 from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
@@ -28,14 +27,12 @@ from bh.studio.finer import Finer, finer
 from bh.studio.frames import Json, creases_of, described, line, packed, surface
 from bh.studio.pictures import Pictures
 from bh.studio.sheets import BARS, LiveSheet, material_of, of_file, of_library
+from bh.studio.strokes import Was, moved, pushed
 
 BUDGET = 0.03  # s of an update
 FARTHEST = 10.0  # sizes of the sheet that a hand may be away from it
-REMEMBERED = 200  # strokes that are taken back
 LONGEST_REST = 20.0  # s that a file may wait for the state at rest, and for a run from flat
 TIDY = 5.0  # s between two times that free memory goes back to the system
-
-Was = tuple[LiveSheet, Mark, str]
 
 
 class Desk:
@@ -53,7 +50,7 @@ class Desk:
         self._shown: tuple[object, ...] = ()
         self._snapped = False  # since the last picture
         self._pictures = Pictures()
-        self._finer: tuple[object, Finer] | None = None  # of what is shown, and what it is
+        self._finer: tuple[State, Finer] | None = None  # a state, and what a finer mesh says of it
         self._flat: tuple[State, FromFlat] | None = None  # a state, and where a run from flat ends
         self._tidied = time.monotonic()
         self._news: list[Json] = []
@@ -115,12 +112,9 @@ class Desk:
     def _remember(self, message: asked.Asked, before: Was) -> None:
         """What was asked for before a stroke; its moves after the first are of one change with it."""
         number = message.stroke if isinstance(message, asked.Move) else None
-        stroke = None if number is None else (message.do, number, *_moved(message))
+        stroke = None if number is None else (message.do, number, *moved(message))
         if stroke is None or stroke != self._stroke:
-            self._past.append(before)
-            marks = lightened([mark for _, mark, _ in self._past], REMEMBERED)
-            kept = self._past[-REMEMBERED:]
-            self._past = [(sheet, mark, made) for (sheet, _, made), mark in zip(kept, marks, strict=True)]
+            pushed(self._past, before)
         self._stroke = stroke
         self._undone.clear()
 
@@ -143,7 +137,7 @@ class Desk:
             case asked.Colour(by=by):
                 self._paint(by)
             case asked.Export(what=what):
-                self.frame = self.session.rest(LONGEST_REST)
+                self.frame = self._rest()
                 if what in ("scene", "python"):
                     ends = time.monotonic() + LONGEST_REST
                     self.from_flat(lambda: time.monotonic() < ends)
@@ -182,7 +176,7 @@ class Desk:
         if what == "flatten":
             flat = Controls(dict.fromkeys(self.session.creases, 0.0))
             if flat != self.session.wanted:
-                self._past.append(now)
+                pushed(self._past, now)
                 self._undone.clear()
                 self.session.let_go()
                 self.session.ask(flat)
@@ -197,8 +191,8 @@ class Desk:
             self.put(sheet, there=there)
         self.material = material
         past.pop()
-        future.append(now)
-        self._stroke = None
+        pushed(future, now)
+        self._stroke, self._shown = None, ()  # the same controls may be those of another state
         return [] if sheet is now[0] else [self.describe()]
 
     def _near(self, what: str, away: NDArray[np.float64]) -> None:
@@ -250,16 +244,23 @@ class Desk:
         now = self.sheet.model.sheet
         if message.name is not None:
             young, nu, t, _ = material_of(message.name)
-            self.material, now = message.name, Sheet(E=young, nu=nu, t=t)
+            now = Sheet(E=young, nu=nu, t=t)
         nu = now.nu if self.sheet.model.formulation != BARS else 0.0
         sheet = replace(
             now, E=message.E or now.E, nu=nu if message.nu is None else message.nu, t=message.t or now.t
         )
         self.put(self.sheet.of(sheet), self.session.wanted)
+        self.material = message.name or self.material
+
+    def _rest(self) -> Frame:
+        """The state at rest; a snap on the way there is told with the next picture."""
+        frame = self.session.rest(LONGEST_REST)
+        self._snapped = self._snapped or frame.snapped
+        return frame
 
     def _check(self) -> Json:
         """The same state by a run from flat, on this mesh and on a coarser one: how far it is off."""
-        frame = self.session.rest(LONGEST_REST)
+        frame = self._rest()
         if not any(step.actuations for step in self.session.scene().steps):
             return line("there is nothing to check yet")
         path = trace(self.session.scene(), estimate=True, warn=False)
@@ -370,15 +371,15 @@ class Desk:
             a frame of kind "finer" with its mesh, the error of the energy and why there is none; None where it was
             ended, or there is no state at rest to be refined.
         """
-        key, frame = self._now(), self.frame
+        frame = self.frame
         if not frame.at_rest:
             return None
-        if self._finer is None or self._finer[0] != key:
+        if self._finer is None or self._finer[0] is not frame.state:
             found = finer(self.sheet.model, frame, going)
             give_back()  # the factors of its meshes: it may be long until the next wish
             if found is None:
                 return None
-            self._finer = key, found
+            self._finer = frame.state, found
         found = self._finer[1]
         meets = len(self_contact(frame.state))
         head: Json = {
@@ -418,7 +419,7 @@ class Desk:
                 return None
             self._flat = frame.state, found
             if not found.here:
-                session.leave()
+                session.leave(frame.state)
         return self._flat[1]
 
     def describe(self) -> Json:
@@ -429,16 +430,3 @@ class Desk:
 
 def _file(name: str, data: bytes) -> Json:
     return {"kind": "file", "name": name, "data": base64.b64encode(data).decode()}
-
-
-def _moved(message: asked.Asked) -> tuple[object, ...]:
-    """Which slider, point or jaws a message moves."""
-    match message:
-        case asked.Fold(crease=crease):
-            return (crease,)
-        case asked.Pull(node=node):
-            return (node,)
-        case asked.Pinch(a=a, b=b):
-            return a, b
-        case _:
-            return ()

@@ -5,9 +5,12 @@ Connections wait in the queue of the socket until the server takes it over, or u
 
 from __future__ import annotations
 
+import contextlib
 import secrets
+import selectors
 import socket
 import threading
+import time
 import webbrowser
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -73,15 +76,23 @@ class Door:
             "HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain; charset=utf-8\r\n"
             f"Content-Length: {len(body)}\r\nX-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n"
         )
-        first = self.sockets[0]
-        first.settimeout(PATIENCE)
-        try:
-            connection, _ = first.accept()
-            with connection:
-                connection.settimeout(PATIENCE)
-                if f"token={self.token} ".encode() in connection.recv(LONGEST).split(b"\r\n")[0]:
-                    connection.sendall(head.encode() + body)
-        except OSError:  # nobody has come, or has gone again
-            pass
-        for each in self.sockets:
-            each.close()
+        ends = time.monotonic() + PATIENCE
+        with selectors.DefaultSelector() as waiting, contextlib.ExitStack() as opened:
+            for each in self.sockets:
+                opened.enter_context(each)
+                waiting.register(each, selectors.EVENT_READ)
+            while (left := ends - time.monotonic()) > 0.0:
+                for key, _ in waiting.select(left):
+                    found = key.fileobj
+                    assert isinstance(found, socket.socket)
+                    try:
+                        if found in self.sockets:  # a browser may open more connections than it asks by
+                            waiting.register(opened.enter_context(found.accept()[0]), selectors.EVENT_READ)
+                            continue
+                        waiting.unregister(found)
+                        found.settimeout(PATIENCE)
+                        if f"token={self.token} ".encode() in found.recv(LONGEST).split(b"\r\n")[0]:
+                            found.sendall(head.encode() + body)
+                            return
+                    except OSError:  # it has gone again
+                        continue

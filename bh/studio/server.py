@@ -311,19 +311,21 @@ class Window(tornado.websocket.WebSocketHandler):
         await asyncio.sleep(QUIET)
         if not going.is_set():
             return
+        run = asyncio.get_running_loop().run_in_executor
         try:
-            found = await asyncio.get_running_loop().run_in_executor(
-                self.studio.pool, desk.finer, going.is_set, heard
-            )
+            found = await run(self.studio.pool, desk.finer, going.is_set, heard)
         except Exception as error:
             await self._say({"kind": "line", "text": f"no finer mesh ({type(error).__name__}: {error})"})
             return
         if found is not None and going.is_set():
             await self.write_message(found, binary=True)
-        run = asyncio.get_running_loop().run_in_executor
-        flat = await run(self.studio.pool, desk.from_flat, going.is_set)
-        if flat is not None and going.is_set():
-            await self._say(flat.message())
+        try:
+            flat = await run(self.studio.pool, desk.from_flat, going.is_set)
+            told = flat.message() if flat is not None else None
+        except Exception as error:
+            told = {"kind": "line", "text": f"no run from flat ({type(error).__name__}: {error})"}
+        if told is not None and going.is_set():
+            await self._say(told)
 
     async def _do(self, desk: Desk, message: str | bytes) -> None:
         """One message, answered; the last good state is kept where it cannot be done."""

@@ -57,7 +57,7 @@ $("kind").onchange = ({ target }) => ask({ do: "crease", crease: $("spring-of").
 // The numbers that the sheet has, in place of those that were refused.
 export function asItIs() {
   const { sheet } = now;
-  $("E").value = sheet.material.E; $("t").value = sheet.material.t; $("contact").checked = sheet.contact; oneCrease();
+  $("material").value = sheet.material.name; $("E").value = sheet.material.E; $("t").value = sheet.material.t; $("contact").checked = sheet.contact; oneCrease();
   for (const input of $("values").querySelectorAll("input")) input.value = [sheet.values[input.dataset.key]].flat().join(" ");
 }
 
