@@ -218,7 +218,8 @@ def distance(bar: Indenter, away: Array) -> tuple[Array, Array, Array]:
     axes = np.array((bar.across, bar.up))
     flat = away @ axes.T
     sign, beyond = np.copysign(1.0, flat), np.abs(flat) - np.asarray(bar.half)
-    round_ = (beyond > 0.0).all(axis=1)
+    # a cylinder is round right above and below its axis, too
+    round_ = ((beyond > 0.0) | (np.asarray(bar.half) == 0.0)).all(axis=1) & (beyond > 0.0).any(axis=1)
     length = np.where(round_, np.hypot(*beyond.T), 1.0)
     wide = beyond[:, 0] > beyond[:, 1]
     side = np.column_stack((wide, ~wide)).astype(float)

@@ -197,6 +197,11 @@ def fold_strips(
         ModelError: the fold asks for what strips cannot do; one line.
     """
     mesh = builder.mesh
+    if crease in mesh.side_of:
+        raise ModelError(
+            f"fold of crease '{crease}': it is one edge of the strip of wide crease '{mesh.side_of[crease]}' and stays "
+            f"flat; fold '{mesh.side_of[crease]}' by rest"
+        )
     names = [name for name in wide_names(mesh) if crease in (name, "all")]
     for name in names:
         if not isinstance(rest, int | float) or list(given) != ["rest"]:

@@ -165,8 +165,8 @@ def _check_instead(strip: SheetZone, around: Sequence[Sheet]) -> None:
     if strip.instead is not None and any(sheet != strip.instead for sheet in around):
         raise ModelError(
             f"wide crease '{str(strip.where).removeprefix(STRIP)}' has Lstar or stiffness and was made as thin as that "
-            f"takes in a sheet of t = {strip.instead.t:g} mm, but a zone that was added later makes the sheet there of "
-            "something else; add zones before wide creases"
+            f"takes in a sheet of t = {strip.instead.t:g} mm, but the sheet there is another one now (of the model, "
+            "or of a zone that was added later); give sheet and zones before wide creases"
         )
 
 

@@ -11,6 +11,9 @@ that adapts; here the state that is found is one of the model as it was.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,6 +66,18 @@ class Hardening:
         self._eased = True
         self._set(max(self._factor / HARDER, 1.0))
         return True
+
+    @contextmanager
+    def own(self) -> Iterator[None]:
+        """While it lasts barriers are those of the model: others look at the system between two steps."""
+        if self._system is None or self._factor == 1.0:
+            yield
+            return
+        self._system.harden(1.0)
+        try:
+            yield
+        finally:
+            self._system.harden(self._factor)
 
     def end(self) -> None:
         """The motion is over, wherever it has led; barriers are those of the model."""

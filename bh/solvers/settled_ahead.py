@@ -14,7 +14,7 @@ from bh.solvers.load_control import LoadControl
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, Point, point
 from bh.solvers.settling import Settling
-from bh.solvers.system import Hindered, System
+from bh.solvers.system import Hindered, Remembering, System
 
 AHEAD = 0.02  # of the step, from the last stable state to where the sheet comes to rest
 STEPS = 500  # downhill
@@ -22,13 +22,16 @@ FALLS = 5  # in one step
 
 
 def snaps(system: System) -> bool:
-    """Is a sheet let fall where its branch leads nowhere? Only where something stops it, and does not rub.
+    """Is a sheet let fall where its branch leads nowhere? Only where something stops it, and nothing hangs on the way.
+
+    What rubs, and creases that yield, remember the last state of the path; the fall begins at one before it.
 
     Args:
         system: of the step.
     """
     rubs = isinstance(system, Lagging) and system.lags
-    return isinstance(system, Hindered) and system.hindered and not rubs
+    yields = isinstance(system, Remembering) and system.remembers
+    return isinstance(system, Hindered) and system.hindered and not (rubs or yields)
 
 
 def settled_ahead(system: System, seen: Sequence[Point], load: LoadControl) -> Increment | None:

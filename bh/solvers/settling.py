@@ -158,7 +158,8 @@ class Settling:
         """The steps of a motion; barriers are the model's again at its end, and `harder` than that on the way."""
         now, shift, still = system.evaluate(q, lam), self.shift, 0
         for step in range(self.most):
-            yield q
+            with harder.own():
+                yield q
             matrix = system.tangent(q, lam, now.forces).matrix
             if now.imbalance <= self.newton.tolerance or (still > 3 and now.imbalance <= CALM):
                 if not harder.ease():

@@ -15,6 +15,7 @@ from bh.solvers.hardening import HARDEST, SOON, Hardening
 from bh.solvers.settling import Settling
 from tests.unit.test_contact_barrier import two_layers
 from tests.unit.test_stops import SCENE, net
+from verification.studies.solver.benchmark_systems import VonMisesTruss
 
 GAP, APART = 0.1, 0.04
 
@@ -69,6 +70,24 @@ def test_a_motion_that_is_given_up_leaves_the_models_barriers() -> None:
     harder, system = hardened(0.001, 0.01)
     harder.end()
     assert system.factors[-1] == 1.0
+
+
+def test_between_two_steps_the_barriers_are_the_models() -> None:
+    """A window looks at the sheet there, and would tell contact forces of a barrier that no model has."""
+    harder, system = hardened(0.001, 0.01)
+    with harder.own():
+        assert system.factors[-1] == 1.0
+    assert system.factors[-1] == HARDEST
+
+
+def test_who_waits_for_a_step_of_a_motion_finds_the_models_barriers() -> None:
+    """Barriers that are hard all the way: a motion gives its steps with the model's own, and goes on with hard ones."""
+    harder, blocked = hardened(0.001, 0.01)
+    motion = Settling()._steps(VonMisesTruss(), np.zeros(1), 0.1, harder)
+    for _ in range(3):
+        next(motion)
+        assert blocked.factors[-1] == 1.0
+    assert blocked.factors[-5:] == [1.0, HARDEST, 1.0, HARDEST, 1.0]
 
 
 def test_a_harder_barrier_presses_so_many_times_as_much_and_knows_its_room() -> None:

@@ -11,6 +11,8 @@ import pytest
 import bh
 from bh.solvers.outcome import Outcome
 from bh.solvers.points import Increment, point
+from bh.solvers.settled_ahead import snaps
+from bh.solvers.system import Remembering
 from bh.solvers.walk import Walk, walk
 from verification.studies.solver.benchmark_systems import VonMisesTruss
 
@@ -66,3 +68,24 @@ def test_what_nothing_stands_in_the_way_of_ends_as_before() -> None:
 def test_a_strategy_that_stays_on_its_branch_does_not_fall() -> None:
     stays = bh.Automatic(arc=bh.ArcLength(most=1), at_bifurcation="primary")
     assert walked(Hindered(), stays)[-1].outcome is not Outcome.REACHED
+
+
+class Yielding(Hindered):
+    """Creases that yield: what it answers depends on the states before."""
+
+    remembers, history = True, np.zeros((0, 2))
+
+    def history_at(self, q: np.ndarray, lam: float) -> np.ndarray:
+        return self.history
+
+    def remember(self, history: np.ndarray) -> None: ...
+
+    def takes(self, history: np.ndarray) -> bool:
+        return True
+
+
+def test_a_sheet_that_remembers_its_way_does_not_fall_from_a_state_before() -> None:
+    """What creases have yielded on the way by arc length would be taken back to a state that had not seen it."""
+    assert isinstance(Yielding(), Remembering)
+    assert not snaps(Yielding())
+    assert walked(Yielding(), LOST)[-1].outcome is not Outcome.REACHED

@@ -305,7 +305,7 @@ def test_strips_across_zones_and_zones_behind_strips_are_refused() -> None:
         model.zone(half, t=0.3).wide_crease("crease", Lstar=20.0)
     strip = model.wide_crease("crease", Lstar=20.0)
     with pytest.raises(
-        bh.InputError, match=r"wide crease 'crease' has Lstar or stiffness .*add zones before"
+        bh.InputError, match=r"wide crease 'crease' has Lstar or stiffness .*give sheet and zones before"
     ):
         strip.zone("all", t=0.3)
     assert strip.zone("all", t=SHEET.t).sections.of is not None
@@ -358,3 +358,20 @@ def test_reports_tell_wide_creases_by_their_own_name() -> None:
     assert [text.get_text() for text in legend.get_texts()] == ["wide crease", "mountain crease"]
     labels = [text.get_text() for text in report_figure(scene).legends[0].get_texts()]
     assert labels == ["boundary", "wide crease", "mountain"]
+
+
+@pytest.mark.parametrize("given", [{"by": 1.0}, {"rest": 2.0}, {"rest": 2.0, "Lstar": 20.0}])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_one_edge_of_a_strip_is_not_folded(side: str, given: dict[str, float]) -> None:
+    """It was, without a word."""
+    mesh = mesh_of(meshes.wide_creases(meshes.strip(40.0, 20.0, [10.0]), 2.0), 8, 2)
+    model = bh.Model(mesh, SHEET).wide_crease("crease", Lstar=20.0)
+    with pytest.raises(bh.ModelError, match="one edge of the strip of wide crease 'crease' and stays flat"):
+        bh.trace(model.fold(f"crease-{side}", **given))
+
+
+def test_a_strip_of_another_sheet_says_what_has_changed() -> None:
+    mesh = mesh_of(meshes.wide_creases(meshes.strip(40.0, 20.0, [10.0]), 2.0), 8, 2)
+    model = bh.Model(mesh, SHEET).wide_crease("crease", Lstar=20.0).fold("crease", rest=2.0)
+    with pytest.raises(bh.ModelError, match="the sheet there is another one now"):
+        bh.trace(replace(model, sheet=replace(SHEET, t=2.0 * SHEET.t)))

@@ -271,7 +271,8 @@ def _measure(p, centre, axes, shape, n, H):  # type: ignore[no-untyped-def]
         for e in range(3):
             H[c, e] = 0.0
     sign_s, sign_z = math.copysign(1.0, s), math.copysign(1.0, z)
-    if qs > 0.0 and qz > 0.0:
+    # a cylinder is round right above and below its axis, too
+    if (qs > 0.0 or (shape[0] == 0.0 and qz > 0.0)) and (qz > 0.0 or (shape[1] == 0.0 and qs > 0.0)):
         length = math.hypot(qs, qz)
         g = length - shape[2]
         if g >= shape[4]:
