@@ -175,10 +175,10 @@ def test_a_browser_that_holds_a_second_connection_ready_is_told_too() -> None:
 
 
 def test_a_run_from_flat_that_breaks_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    def breaks(*_: object) -> list[dict[str, object]]:
+    def breaks(*_: object) -> None:
         raise ArithmeticError("odd")
 
-    monkeypatch.setattr(Desk, "branch", breaks)
+    monkeypatch.setattr(Desk, "from_flat", breaks)
     lines: list[Any] = []
 
     async def visit() -> None:

@@ -331,6 +331,13 @@ def test_cases_of_over_a_minute_are_long_and_have_a_record_of_a_whole_run() -> N
         assert {check["case"] for check in record["checks"]} == {name}
 
 
+def test_records_name_no_pictures() -> None:
+    """They are shipped without any, so that a report has nothing to miss."""
+    for file in (Path(registry.__file__).parents[1] / "records").glob("*.json"):
+        for of in json.loads(file.read_text())["cases"]:
+            assert not of["pictures"] and not of["scenes"], file.name
+
+
 def test_cases_at_a_time_find_the_same(tmp_path: Path) -> None:
     """By two processes: the same values in the same order, and what fails there is told here."""
     names = ["shear_calibration", "derivatives", "strips"]

@@ -362,7 +362,7 @@ def test_reports_tell_wide_creases_by_their_own_name() -> None:
 
 @pytest.mark.parametrize("given", [{"by": 1.0}, {"rest": 2.0}, {"rest": 2.0, "Lstar": 20.0}])
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_one_edge_of_a_strip_is_not_folded(side: str, given: dict[str, float]) -> None:
+def test_one_edge_of_a_strip_is_not_folded(side: str, given: dict[str, Any]) -> None:
     """It was, without a word."""
     mesh = mesh_of(meshes.wide_creases(meshes.strip(40.0, 20.0, [10.0]), 2.0), 8, 2)
     model = bh.Model(mesh, SHEET).wide_crease("crease", Lstar=20.0)
