@@ -67,15 +67,19 @@ class Plot(BaseModel):
     series: list[Series]
     caption: str = ""
 
-    def dressed(self) -> list[tuple[int, str, Series]]:
-        """The series with the number of each one's colour (-1 for references, which are grey) and its dashes."""
+    def dressed(self) -> list[tuple[int, str, str, Series]]:
+        """The series with the number of each one's colour (-1 for references, which are grey), dashes and marker.
+
+        No two are alike: where the colours begin anew, dashes and markers are others.
+        """
         found, counts = [], {True: 0, False: 0}
         for series in self.series:
             grey = series.style == "reference"
             dashes = REFERENCE_DASHES if grey else DASHES
-            number = counts[grey] % len(dashes)
+            turn, number = divmod(counts[grey], len(dashes))
             counts[grey] += 1
-            found.append((-1 if grey else number, dashes[number], series))
+            other = (number + 3 * turn) % len(dashes)
+            found.append((-1 if grey else number, dashes[other], MARKERS[other], series))
         return found
 
 
@@ -87,7 +91,7 @@ def svg(plot: Plot, prefix: str) -> str:
     """
     prefix = re.sub(r"[^\w-]", "-", prefix)  # what a file of results calls a plot is part of it
     dressed = plot.dressed()
-    for _, _, series in dressed:
+    for *_, series in dressed:
         if len(series.x) != len(series.y):
             raise ReportError(
                 f"plot '{plot.id}', series '{series.label}': {len(series.x)} x for {len(series.y)} y; give pairs"
@@ -111,12 +115,12 @@ def with_prefix(drawn: str, prefix: str) -> str:
 def legend(plot: Plot) -> list[tuple[str, str]]:
     """For every series a small `<svg>` swatch and its label, both HTML."""
     found = []
-    for number, dash, series in plot.dressed():
+    for number, dash, marker, series in plot.dressed():
         colour = "var(--soft)" if number < 0 else f"var(--s{number + 1})"
         stroke = (
             f'<path d="M1 7H29" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
         )
-        mark = "" if number < 0 else f'<path d="{_SHAPES[MARKERS[number]]}" fill="{colour}"/>'
+        mark = "" if number < 0 else f'<path d="{_SHAPES[marker]}" fill="{colour}"/>'
         parts = {"line": stroke + mark, "points": mark, "reference": stroke}[series.style]
         swatch = f'<svg viewBox="0 0 30 14" width="30" height="14" aria-hidden="true">{parts}</svg>'
         found.append((swatch, markup(series.label)))
@@ -166,15 +170,15 @@ def picture_link(file: Path) -> tuple[str, int, int]:
 def _curves(plot: Plot) -> list[drawing.Curve]:
     """The series, references beneath the others, of which the first are the widest: each shows beneath the next."""
     dressed = plot.dressed()
-    last = max((number for number, _, _ in dressed), default=0)
+    last = max((number for number, *_ in dressed), default=0)
     found = []
-    for number, dash, series in sorted(dressed, key=lambda item: item[0] >= 0):
+    for number, dash, marker, series in sorted(dressed, key=lambda item: item[0] >= 0):
         x, y = _values(series.x, plot.x.log), _values(series.y, plot.y.log)
         if number < 0:
             found.append(drawing.Curve(x, y, "var(--soft)", 1.3, dash))
             continue
         extra = (last - number) / max(last, 1)
-        colour, marker = f"var(--s{number + 1})", MARKERS[number]
+        colour = f"var(--s{number + 1})"
         if series.style == "points":
             found.append(drawing.Curve(x, y, colour, 0.0, marker=marker, size=5.0 + 2.0 * extra))
             continue

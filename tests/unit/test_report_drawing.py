@@ -8,6 +8,7 @@ import re
 import pytest
 
 from reports.drawing import Curve, Scale, drawn, scale
+from reports.figures import Plot, legend
 
 
 def axis(*values: float, log: bool = False) -> Scale:
@@ -79,3 +80,14 @@ def test_long_curves_have_few_markers() -> None:
         axis(0.0, 99.0), axis(0.0, 99.0), [Curve(at, at, "red", 1.0, "none", "o", 4.0, (3, 12))], "f"
     )
     assert text.count("a2 2 0 1 0 4 0") == 9
+
+
+def test_no_two_curves_of_a_plot_look_alike() -> None:
+    """Ten kinds of sheets are more than there are colours."""
+    series = [{"label": str(k), "x": [1.0, 2.0], "y": [1.0 + k, 2.0 + k]} for k in range(16)]
+    axes = {"x": {"label": "x"}, "y": {"label": "y"}}
+    swatches = [
+        swatch
+        for swatch, _ in legend(Plot.model_validate({"id": "p", "title": "t", "series": series, **axes}))
+    ]
+    assert len(set(swatches)) == 16
