@@ -28,6 +28,9 @@ def moved(message: asked.Asked) -> tuple[object, ...]:
 
     Args:
         message: checked.
+
+    Returns:
+        its name or numbers; nothing of other messages.
     """
     match message:
         case asked.Fold(crease=crease):
