@@ -223,11 +223,11 @@ def distance(bar: Indenter, away: Array) -> tuple[Array, Array, Array]:
     length = np.where(round_, np.hypot(*beyond.T), 1.0)
     wide = beyond[:, 0] > beyond[:, 1]
     side = np.column_stack((wide, ~wide)).astype(float)
-    inside = np.where(round_[:, None], beyond / length[:, None], side) * sign
+    normal = np.where(round_[:, None], beyond / length[:, None], side) * sign
     g = np.where(round_, length, beyond.max(axis=1)) - bar.radius
-    along = np.column_stack((-inside[:, 1], inside[:, 0])) @ axes
+    along = np.column_stack((-normal[:, 1], normal[:, 0])) @ axes
     curved = np.where(round_, 1.0 / length, 0.0)[:, None, None] * along[:, :, None] * along[:, None, :]
-    return g, inside @ axes, curved
+    return g, normal @ axes, curved
 
 
 def law(g: Array, k: float, d: float) -> tuple[Array, Array, Array]:

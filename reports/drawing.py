@@ -232,7 +232,7 @@ def _curve(curve: Curve, across: Callable[[float], float], up: Callable[[float],
     if curve.marker:
         first, every = curve.marked or (0, 1)
         marks = "".join(
-            _mark(curve.marker, a, b, 0.5 * curve.size)
+            mark(curve.marker, a, b, 0.5 * curve.size)
             for a, b in places[first::every]
             if math.isfinite(a) and math.isfinite(b)
         )
@@ -240,7 +240,18 @@ def _curve(curve: Curve, across: Callable[[float], float], up: Callable[[float],
     return text
 
 
-def _mark(marker: str, a: float, b: float, r: float) -> str:
+def mark(marker: str, a: float, b: float, r: float) -> str:
+    """What the path of a marker is drawn by.
+
+    Args:
+        marker: a letter, as of `Curve`.
+        a: where its middle is across, pixels.
+        b: the same down.
+        r: half of its size, pixels.
+
+    Returns:
+        the `d` of a `<path>`.
+    """
     if marker == "o":
         return (
             f"M{_n(a - r)} {_n(b)}a{_n(r)} {_n(r)} 0 1 0 {_n(2 * r)} 0a{_n(r)} {_n(r)} 0 1 0 {_n(-2 * r)} 0z"

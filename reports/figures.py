@@ -120,7 +120,7 @@ def legend(plot: Plot) -> list[tuple[str, str]]:
         stroke = (
             f'<path d="M1 7H29" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
         )
-        mark = "" if number < 0 else f'<path d="{_SHAPES[marker]}" fill="{colour}"/>'
+        mark = "" if number < 0 else f'<path d="{drawing.mark(marker, 15.0, 7.0, 3.2)}" fill="{colour}"/>'
         parts = {"line": stroke + mark, "points": mark, "reference": stroke}[series.style]
         swatch = f'<svg viewBox="0 0 30 14" width="30" height="14" aria-hidden="true">{parts}</svg>'
         found.append((swatch, markup(series.label)))
@@ -210,18 +210,6 @@ def _power(value: float) -> str:
 
 
 # --- SVG of a page --------------------------------------------------------------------------------------------
-
-_SHAPES = {
-    "o": "M12 7a3 3 0 1 0 6 0a3 3 0 1 0-6 0",
-    "s": "M12 4h6v6h-6z",
-    "^": "M15 3.5l3.5 6.5h-7z",
-    "D": "M15 3l4 4l-4 4l-4-4z",
-    "v": "M15 10.5l3.5-6.5h-7z",
-    "P": "M14 3.5h2v2.5h2.5v2h-2.5v2.5h-2v-2.5h-2.5v-2h2.5z",
-    "X": "M12.5 3.5l2.5 2l2.5-2l1 1l-2 2.5l2 2.5l-1 1l-2.5-2l-2.5 2l-1-1l2-2.5l-2-2.5z",
-    "*": "M15 2.5l1.2 3.2h3.3l-2.6 2.1l1 3.4l-2.9-2l-2.9 2l1-3.4l-2.6-2.1h3.3z",
-}
-
 
 _GREEK = {
     "alpha": "\N{GREEK SMALL LETTER ALPHA}",

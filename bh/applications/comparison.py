@@ -18,7 +18,6 @@ from bh.formulations.registry import names
 from bh.loading.builder import load_steps
 from bh.model.model import Model
 from bh.model.refinement import Goal
-from bh.model.wide_crease import folding
 from bh.paths.path import Path
 from bh.runtime.progress import ProgressMeter, meter, stage
 from bh.solving.trace import trace
@@ -191,7 +190,7 @@ def _plain(member: Member) -> dict[str, object]:
     if not member.reached or member.path is None:
         return out
     state, far = member.path[-1], member.distance
-    angles = {crease: state.fold_angle(crease) for crease in folding(state.mesh)}
+    angles = {crease: state.fold_angle(crease) for crease in state.mesh.drawn_creases}
     return out | {
         "stable": member.path.stable,
         "energy": state.energy.as_dict(),
@@ -238,7 +237,9 @@ def lines(found: Comparison) -> list[str]:
         off = "reference" if member.formulation == found.reference else _percent(energy.total, total)
         far = "" if member.distance is None else f"{member.distance.largest:.4g}"
         folds = [
-            math.degrees(float(a.mean())) for c in folding(state.mesh)[:3] if len(a := state.fold_angle(c))
+            math.degrees(float(a.mean()))
+            for c in state.mesh.drawn_creases[:3]
+            if len(a := state.fold_angle(c))
         ]
         row = [member.formulation, *(f"{e:.5g}" for e in (energy.stretching, energy.bending, energy.folding))]
         row += [f"{energy.total:.5g}", off, far, " ".join(f"{angle:.1f}" for angle in folds)]

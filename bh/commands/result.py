@@ -5,7 +5,6 @@ from __future__ import annotations
 from bh.analysis.contact import Contact
 from bh.analysis.yielding import Yielding
 from bh.formulations.stress import Extreme
-from bh.model.wide_crease import folding
 from bh.paths.path import Path as Trace
 from bh.scene.load import Scene
 
@@ -23,7 +22,7 @@ def result(
     """
     model = path.model
     mesh, last = model.mesh, path[-1]
-    folds = {crease: last.fold_angle(crease) for crease in folding(mesh)}
+    folds = {crease: last.fold_angle(crease) for crease in mesh.drawn_creases}
     steps = []
     for number in range(len(model.steps)):
         records = [record for record in path.records if record.step == number]

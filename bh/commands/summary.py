@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bh.model.wide_crease import folding
 from bh.runtime.terminal import say
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ def summary(
     for name, force in last.contact_forces.items():
         x, y, z = force
         say(f"force of {name} on the sheet: {x:.4g}, {y:.4g}, {z:.4g} N")
-    creases = folding(model.mesh)
+    creases = model.mesh.drawn_creases
     for crease in creases[:6]:
         a = last.fold_angle(crease)
         say(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bh.errors import ModelError
 from bh.formulations.stress import Resultants, Stress, stress_of
 from bh.loading.load_step import crease_hinges
-from bh.model.wide_crease import strip_fold, wide_names
+from bh.model.wide_crease import strip_fold
 from meshes import SheetMesh
 
 Array = NDArray[np.float64]
@@ -117,7 +117,7 @@ class State:
         Returns:
             (edges,) in order along the crease, 0 to 2 pi, less than pi at a mountain.
         """
-        if crease in wide_names(self.mesh):
+        if crease in self.mesh.wide_creases:
             return np.pi - self.fold_angle(crease)
         return self.dihedral_angles[crease_hinges(self.mesh, crease)]
 
@@ -129,7 +129,7 @@ class State:
         Returns:
             (edges,) in order along the crease.
         """
-        if crease in wide_names(self.mesh):
+        if crease in self.mesh.wide_creases:
             return strip_fold(self.mesh, crease, self.stress().curvature)
         return np.pi - self.dihedral(crease)
 

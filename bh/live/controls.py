@@ -14,7 +14,6 @@ from bh.live.grips import Grip, Jaws
 from bh.model.actuations import Fold, Force, Pull
 from bh.model.model import Model
 from bh.model.step import Actuation
-from bh.model.wide_crease import wide_names
 
 Array = NDArray[np.float64]
 CLOSED = math.pi - 1e-3  # rad; the largest fold angle that a slider can ask for
@@ -168,7 +167,7 @@ def fold_of(model: Model, crease: str, angle: float) -> Fold:
         crease: its name.
         angle: rad, positive the way that it is drawn; of a wide crease mountain positive.
     """
-    if crease in wide_names(model.mesh):
+    if crease in model.mesh.wide_creases:
         return Fold(crease, rest=math.pi - angle)
     law = model.creases.get(crease)
     if law is None:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from bh.live.controls import Controls
 
 Array = NDArray[np.float64]
-MOST_BYTES = (
-    8_000_000  # of the unknowns that are kept; of what lies further back there are the controls alone
-)
+# of the unknowns that are kept; of what lies further back there are the controls alone
+MOST_BYTES = 8_000_000
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ import numpy as np
 
 from bh.loading.load_step import crease_hinges
 from bh.model.model import Model, drawn_flat
-from bh.model.wide_crease import wide_names
 from meshes import SheetMesh
 from meshes.topology import dihedral_angles
 
@@ -66,7 +65,7 @@ def handled(mesh: SheetMesh) -> list[str]:
         chains first.
     """
     drawn = [name for name in mesh.creases if mesh.folds.get(name) != "flat"]
-    return [*chains(mesh, drawn), *wide_names(mesh)]
+    return [*chains(mesh, drawn), *mesh.wide_creases]
 
 
 def drawn_folds(mesh: SheetMesh, names: list[str]) -> dict[str, float]:

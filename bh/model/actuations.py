@@ -19,7 +19,7 @@ from bh.errors import ModelError
 from bh.model.mould import check_friction
 from bh.model.step import Actuation, Body, StepBuilder
 from bh.model.supports import AXES, select
-from bh.model.wide_crease import fold_strips, wide_names
+from bh.model.wide_crease import fold_strips
 from meshes.quantities import Typed, degrees_meant, take_units
 
 Array = NDArray[np.float64]
@@ -122,7 +122,7 @@ class Fold(Actuation):
 
     def prepare(self, builder: StepBuilder) -> None:
         """Ask for the spring before the first step."""
-        if self._spring and self.crease not in wide_names(builder.mesh):
+        if self._spring and self.crease not in builder.mesh.wide_creases:
             builder.spring(builder.creases(self.crease)[0], self.Lstar, self.stiffness)
 
     def apply(self, builder: StepBuilder) -> None:

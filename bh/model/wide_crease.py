@@ -26,30 +26,6 @@ from meshes.wide import SIDES, STRIP
 Floats = NDArray[np.float64]
 
 
-def wide_names(mesh: SheetMesh) -> tuple[str, ...]:
-    """Names of the wide creases of a mesh.
-
-    Args:
-        mesh: of the sheet.
-
-    Returns:
-        without "strip:".
-    """
-    return mesh.wide_creases
-
-
-def folding(mesh: SheetMesh) -> tuple[str, ...]:
-    """Names of the creases of a mesh.
-
-    Args:
-        mesh: of the sheet.
-
-    Returns:
-        in order, wide ones by their own name in place of their two lines.
-    """
-    return mesh.drawn_creases
-
-
 def strip(
     mesh: SheetMesh,
     name: str,
@@ -79,8 +55,8 @@ def strip(
         ModelError: the mesh has no such strip, or what is given cannot be, or is given twice, or the strip goes through
             several zones; one line.
     """
-    if name not in wide_names(mesh):
-        known = ", ".join(wide_names(mesh)) or "none; draw them by meshes.wide_creases"
+    if name not in mesh.wide_creases:
+        known = ", ".join(mesh.wide_creases) or "none; draw them by meshes.wide_creases"
         raise ModelError(f"the sheet has no wide crease '{name}'; it has {known}")
     given = [key for key, value in (("Lstar", Lstar), ("stiffness", stiffness)) if value is not None]
     given += ["sheet"] * (other is not None) + [f"stiff = {stiff:g}"] * (stiff != 1.0) + list(values)
@@ -202,7 +178,7 @@ def fold_strips(
             f"fold of crease '{crease}': it is one edge of the strip of wide crease '{mesh.side_of[crease]}' and stays "
             f"flat; fold '{mesh.side_of[crease]}' by rest"
         )
-    names = [name for name in wide_names(mesh) if crease in (name, "all")]
+    names = [name for name in mesh.wide_creases if crease in (name, "all")]
     for name in names:
         if not isinstance(rest, int | float) or list(given) != ["rest"]:
             raise _not_for_strips(crease, name, given)

@@ -24,7 +24,6 @@ from bh.model.serialise import ACTUATIONS as MAKERS
 from bh.model.step import Actuation, Step
 from bh.model.supports import Constraint, Hold, RigidBody, Support, directions, select
 from bh.model.until import Until
-from bh.model.wide_crease import wide_names
 from bh.scene.bodies import BODIES, body
 from bh.scene.changes import set_keys
 from bh.scene.contact import check_friction, contact_of, friction_of
@@ -409,7 +408,7 @@ def _check_names(model: Model, numbers: Sequence[int]) -> None:
         for item in asked.actuations:
             key = type(item).__name__.lower()
             crease = getattr(item, "crease", "all")
-            if crease != "all" and not (key == "fold" and crease in wide_names(mesh)):
+            if crease != "all" and not (key == "fold" and crease in mesh.wide_creases):
                 with within(f"steps[{i}].{key}.crease"):
                     mesh.crease_edges(crease)
             if isinstance(item, Force | Displace | Tether | Couple):

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from bh.errors import SceneError
 from bh.model.sheet import Sheet
-from bh.model.wide_crease import strip, told_twice, wide_names
+from bh.model.wide_crease import strip, told_twice
 from bh.model.zones import SheetZone
 from bh.scene.reading import LSTAR, Scale, Stiff, as_table, nearest, read_table, within
 from bh.scene.sheets import OtherSheetTable, zone_of
@@ -85,7 +85,7 @@ def strips_of(
         SceneError: keys that do not go together; one line.
     """
     found = []
-    for name in wide_names(mesh):
+    for name in mesh.wide_creases:
         own = name if name in creases else EVERY
         at = f"creases.{own}"
         item = as_table(creases[own], at)

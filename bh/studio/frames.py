@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from bh.live import Frame, Jaws, Session
 from bh.live.holding import chains
-from bh.model.wide_crease import folding, wide_names
 from bh.scene.folding import MATERIALS
 from bh.studio.colours import Colour
 from bh.studio.exports import FORMATS
@@ -104,7 +103,7 @@ def creases_of(mesh: SheetMesh) -> list[Json]:
     Returns:
         one each, with edges as pairs of nodes in one list; a wide crease is one, of kind "wide", with both its lines.
     """
-    strips = wide_names(mesh)
+    strips = mesh.wide_creases
     return [
         {
             "name": name,
@@ -113,7 +112,7 @@ def creases_of(mesh: SheetMesh) -> list[Json]:
             .ravel()
             .tolist(),
         }
-        for name in folding(mesh)
+        for name in mesh.drawn_creases
     ]
 
 
@@ -130,9 +129,9 @@ def described(
         colour: that it has.
     """
     mesh, model = session.mesh, sheet.model
-    flat = [name for name in folding(mesh) if mesh.folds.get(name) == "flat"]
+    flat = [name for name in mesh.drawn_creases if mesh.folds.get(name) == "flat"]
     whole = {*chains(mesh, list(mesh.creases))}
-    turns = {*session.creases, *(name for name in flat if name in whole)} - {*wide_names(mesh)}
+    turns = {*session.creases, *(name for name in flat if name in whole)} - {*mesh.wide_creases}
     creases = [
         {
             **each,

@@ -15,11 +15,8 @@ from bh.studio.sheets import LONGEST, MOST_TRIANGLES, LiveSheet, live
 
 SCENE = ".toml"
 BARE = re.compile(r"[A-Za-z0-9_-]+")  # keys that need no quotes
-KEPT = (
-    "pattern",
-    "mesh",
-    "model",
-)  # tables that say what the sheet is; the window writes sheet and supports itself
+# tables that say what the sheet is; the window writes sheet and supports itself
+KEPT = ("pattern", "mesh", "model")
 OTHERS = ("sheet", "supports", "creases", "steps", "outputs", "contact", "symmetry", "accuracy")
 
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from bh.errors import InputError
 from bh.live import Session
 from bh.model.supports import Support
-from bh.model.wide_crease import wide_names
 from bh.paths.path import Path as Trace
 from bh.paths.record import Record, StepOutcome
 from bh.scene.load import parse_scene
@@ -129,7 +128,7 @@ def _crease_lines(session: Session) -> list[str]:
 
 
 def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
-    rows, strips = [], wide_names(session.mesh)
+    rows, strips = [], session.mesh.wide_creases
     for name, wanted in session.wanted.folds.items():
         if name in strips:
             rows.append(f"  {{ crease = {quoted(name)}, rest = {math.pi - wanted!r} }},")

@@ -20,7 +20,6 @@ from bh.model.actuations import Fold
 from bh.model.crease_law import CreaseLaw
 from bh.model.model import Model
 from bh.model.sheet import Sheet
-from bh.model.wide_crease import wide_names
 from bh.scene.folding import MATERIALS, PERCENT, Proposal, Wish, proposals
 from bh.scene.load import Outputs, Scene, parse_scene
 from bh.solvers.settling import Settling
@@ -69,7 +68,7 @@ class LiveSheet:
         Raises:
             InputError: it has wide creases, whose strips were made of the sheet that it is.
         """
-        strips = wide_names(self.model.mesh)
+        strips = self.model.mesh.wide_creases
         if strips:
             raise InputError(
                 f"the strip of crease '{strips[0]}' was made for this sheet; give the material in the scene"
@@ -296,7 +295,7 @@ def live(name: str, scene: Scene, tables: str, assumed: tuple[str, ...]) -> Live
                     if model.mesh.folds.get(crease) != "flat":
                         laws.setdefault(crease, CreaseLaw(item.Lstar, item.stiffness))
     model = replace(model, creases=laws, steps=())
-    said = (*map(_strip_said, wide_names(model.mesh)), *(str(remark) for remark in remarks(model)))
+    said = (*map(_strip_said, model.mesh.wide_creases), *(str(remark) for remark in remarks(model)))
     settles = isinstance(scene.strategy, Settling)
     return LiveSheet(name, model, _full(model.mesh), tables, (*assumed, *said), settles=settles)
 
@@ -313,7 +312,7 @@ def _full(mesh: SheetMesh) -> dict[str, float]:
         drawn = np.abs(np.asarray(mesh.fold_angles.get(name, [math.nan])))
         known = drawn[~np.isnan(drawn)]
         found[name] = float(known.mean()) if len(known) else math.pi
-    return {**found, **dict.fromkeys(wide_names(mesh), math.pi)}
+    return {**found, **dict.fromkeys(mesh.wide_creases, math.pi)}
 
 
 def _tables(text: str) -> str:

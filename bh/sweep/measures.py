@@ -12,7 +12,6 @@ from bh.model.model import Model
 from bh.model.plugins import consent
 from bh.model.supports import AXES, select
 from bh.model.until import Until
-from bh.model.wide_crease import wide_names
 from bh.paths.path import Path
 from bh.scene.reading import nearest
 from bh.sweep.points import SweepError
@@ -101,7 +100,7 @@ class Measure:
                 f"measure.values.{self.name}.since = {self.since} does not lie before step {last}"
             )
         if self.observable in CREASES:
-            if self.observable not in ANGLES or self.of not in wide_names(model.mesh):
+            if self.observable not in ANGLES or self.of not in model.mesh.wide_creases:
                 model.mesh.crease_edges(str(self.of))
         elif self.of is not None:
             select(model.mesh, self.of)

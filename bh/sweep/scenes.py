@@ -12,7 +12,6 @@ from pathlib import Path
 
 from bh.errors import InputError, SceneError
 from bh.model.supports import select
-from bh.model.wide_crease import folding
 from bh.paths.path import Path as Trace
 from bh.scene.changes import setter
 from bh.scene.load import Scene, scene_from_tables
@@ -159,7 +158,7 @@ class SceneTask:
         state, mesh = path[-1], path.model.mesh
         energy = state.energy.as_dict()
         found: dict[str, object] = {f"energy_{kind}": energy[kind] for kind in ENERGIES}
-        for crease in folding(mesh):
+        for crease in mesh.drawn_creases:
             angles = state.dihedral(crease)
             if len(angles):
                 found |= {

@@ -319,9 +319,8 @@ def test_the_longest_cases_begin_first() -> None:
 def test_cases_of_over_a_minute_are_long_and_have_a_record_of_a_whole_run() -> None:
     """What a report does not run it shows from a record, whole, not quick."""
     assert {s.name for s in registry.STUDIES if s.seconds > registry.LONGEST and not s.long} == set()
-    records = (
-        Path(registry.__file__).parents[1] / "records"
-    )  # others of these tests have a folder of their own
+    # others of these tests have a folder of their own
+    records = Path(registry.__file__).parents[1] / "records"
     assert {name for name in LONG_CASES if not (records / f"{name}.json").is_file()} <= {"drawings"}
     for file in (records / f"{name}.json" for name in LONG_CASES if name != "drawings"):
         name = file.stem
