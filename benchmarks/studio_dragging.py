@@ -2,9 +2,10 @@
 
 A seeded hand drags sliders, pulls, pinches and lets go of points, holds nodes, undoes, changes the material and opens
 other patterns. Of every state that is shown the forces are computed anew, at rest by a system that knows the
-controls of the frame and nothing else; now and then the controls are solved from flat as well. Seconds are of the
-processor. It ends with exit code 1 where a state is out of balance, a state that never snapped is not that of the run
-from flat, or the memory has grown by more than `LEAK` since the first `WARM` seconds. By then every way of handling has
+controls of the frame and nothing else; now and then its scene is saved and solved as `bh run` does, from flat or, where
+the window says that a run from flat ends elsewhere, from the state beside it. Seconds are of the processor. It ends
+with exit code 1 where a state is out of balance, a scene does not end in the state that was seen, or the memory has
+grown by more than `LEAK` since the first `WARM` seconds. By then every way of handling has
 been gone, so that the kernels that they take are there: one that is compiled keeps about 1 MB, one that is loaded from
 the cache half as much.
 """
@@ -12,16 +13,21 @@ the cache half as much.
 from __future__ import annotations
 
 import argparse
+import base64
 import gc
 import importlib
 import json
 import sys
+import tempfile
 import time
 from dataclasses import dataclass, field, replace
+from io import BytesIO
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 
+from bh.commands.run import solve
 from bh.errors import InputError
 from bh.formulations.protocols import PlacedSystem
 from bh.formulations.registry import formulation
@@ -34,7 +40,8 @@ from bh.model.step import Step
 from bh.runtime.compiling import compilations_heard
 from bh.runtime.memory import give_back
 from bh.runtime.terminal import say
-from bh.solving.trace import trace
+from bh.scene.load import load_scene
+from bh.studio.branch import SAME
 from bh.studio.desk import Desk
 from bh.studio.messages import read
 from bh.studio.sheets import LIBRARY
@@ -43,7 +50,7 @@ TOLERANCE = 1e-6  # imbalance: that of a state that is told as a neutral one; th
 LEAK = 50.0  # MB
 WARM = 300.0  # s of processor time before the memory is read first; half of a run that is shorter than twice that
 MINUTE = 60.0  # s of processor time between two lines
-COMPARED = 40  # one of so many states at rest is solved from flat as well
+COMPARED = 40  # one of so many states at rest is saved as a scene that is solved
 DRAWINGS = Path(__file__).parents[1] / "tests" / "data"
 FILES = ("miura.svg", "pleats.svg")
 WAYS = (
@@ -72,8 +79,8 @@ class Log:
         refused: requests that were answered by a line.
         stuck: frames that said why the sheet cannot go on, and `snaps` those that said it left its branch.
         worst: largest imbalance of a state that was shown as an equilibrium, `off` how many had more than `TOLERANCE`.
-        compared: states that were solved from flat as well, and `elsewhere` those of them on another branch after a
-            snap; `wrong` those that differ without one.
+        compared: states whose scene was solved, and `beside` those of them whose scene came with the state, as a run
+            from flat ends elsewhere; `unreached` scenes that did not end; `wrong` those that ended in another state.
         slowest: s of processor time of one answer.
     """
 
@@ -86,7 +93,8 @@ class Log:
     worst: float = 0.0
     off: int = 0
     compared: int = 0
-    elsewhere: int = 0
+    beside: int = 0
+    unreached: list[str] = field(default_factory=list)
     wrong: list[str] = field(default_factory=list)
     slowest: float = 0.0
 
@@ -100,7 +108,6 @@ class Hand:
         self.desk = Desk()
         self.log = Log()
         self.gone: set[str] = set()  # ways that were gone
-        self.snapped = False  # since the sheet was put on the desk
 
     def act(self) -> None:
         """Do something, watch what comes of it."""
@@ -113,8 +120,6 @@ class Hand:
                 self.desk.take(read(json.dumps(message)))
             except InputError:
                 self.log.refused += 1
-            if message["do"] in ("open", "pattern", "material", "hold"):
-                self.snapped = self.snapped and message["do"] in ("material", "hold")
             for _ in range(self.random.integers(0, 4)):
                 self._frame()
         if self.random.random() < 0.3:
@@ -163,8 +168,6 @@ class Hand:
         return int(self.random.choice(gripped if again else count))
 
     def _another(self) -> dict[str, object]:
-        import base64
-
         if self.random.random() < 0.5:
             return {"do": "pattern", "name": str(self.random.choice(list(LIBRARY)))}
         name = str(self.random.choice(FILES))
@@ -178,7 +181,6 @@ class Hand:
         self.log.frames += 1
         self.log.stuck += bool(frame.note)
         self.log.snaps += frame.snapped
-        self.snapped = self.snapped or frame.snapped
         if not np.isfinite(frame.points).all():
             raise ArithmeticError("a state with nan was shown")
         self._weigh(self.desk.session.imbalance())
@@ -195,16 +197,31 @@ class Hand:
         self._weigh(own_imbalance(session.model, frame))
         if self.log.rests % COMPARED or not any(frame.wanted.folds.values()):
             return
-        path = trace(session.scene(), warn=False)
         self.log.compared += 1
-        off = float(np.abs(path[-1].points - frame.points).max()) / float(np.ptp(session.mesh.points))
-        if path.reached and off > 1e-6:
-            self.log.elsewhere += self.snapped
-            if not self.snapped:
-                energies = path[-1].energy.total, frame.state.energy.total
-                self.log.wrong.append(
-                    f"{self.desk.sheet.name}: {off:.1e} of its size off, energies {energies}"
-                )
+        with tempfile.TemporaryDirectory() as folder:
+            self._repeat(Path(folder))
+
+    def _repeat(self, folder: Path) -> None:
+        """Save the scene of the state at rest and solve it as a person does."""
+        shown = self.desk.frame.points
+        file, *_ = self.desk.take(read(json.dumps({"do": "export", "what": "scene"})))
+        name, data = Path(str(file["name"])), base64.b64decode(str(file["data"]))
+        if name.suffix == ".zip":
+            with ZipFile(BytesIO(data)) as archive:
+                archive.extractall(folder)
+        else:
+            (folder / name).write_bytes(data)
+        out = folder / f"{name.stem}-out"
+        beside = (out / "path.bh").exists()
+        self.log.beside += beside
+        scene = load_scene(folder / f"{name.stem}.toml")
+        path = solve(scene, out, resume=beside, estimate=False, neighbours=False).path
+        what = f"{self.desk.sheet.name}, {'from the state beside it' if beside else 'from flat'}"
+        if not path.reached:
+            self.log.unreached.append(f"{what}: {path.outcome}")
+        elif (off := float(np.abs(path[-1].points - shown).max() / np.ptp(shown))) > SAME:
+            energies = path[-1].energy.total, self.desk.frame.state.energy.total
+            self.log.wrong.append(f"{what}: {off:.1e} of its size off, energies {energies}")
 
 
 def own_imbalance(model: Model, frame: Frame) -> float:
@@ -251,7 +268,7 @@ def main() -> int:
                 sys.stdout.flush()
     grown = resident() - base
     say(f"{spent:.0f} s of the processor, memory grown by {grown:.0f} MB, {hand.log}")
-    return int(grown > LEAK or hand.log.off > 0 or bool(hand.log.wrong))
+    return int(grown > LEAK or hand.log.off > 0 or bool(hand.log.wrong or hand.log.unreached))
 
 
 if __name__ == "__main__":
