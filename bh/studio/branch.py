@@ -59,6 +59,8 @@ def from_flat(session: Session, frame: Frame, settles: bool, going: Callable[[],
             if there.note:
                 return FromFlat(False, f"does not get here: {there.note}")
     off = float(np.linalg.norm(there.points - frame.points, axis=1).max())
+    if anew.left:  # a run follows the branch round its limit points and may go anywhere
+        return FromFlat(False, "snaps on its way, and may end elsewhere")
     if off <= SAME * float(np.ptp(session.mesh.points, axis=0).max()):
         return FromFlat(True, "ends here")
     ends = (

@@ -140,7 +140,8 @@ class Desk:
                 self.frame = self._rest()
                 if what in ("scene", "python"):
                     ends = time.monotonic() + LONGEST_REST
-                    self.from_flat(lambda: time.monotonic() < ends)
+                    if self.from_flat(lambda: time.monotonic() < ends) is None and self.frame.at_rest:
+                        self.session.leave(self.frame.state)  # not known in time
                 name, data = export(what, self.sheet, self.session, self.frame)
                 return [_file(name, data), *self._behind_a_snap(what, name)]
             case asked.Film(pictures=pictures, ms=ms, kind=kind):

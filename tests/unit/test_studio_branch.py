@@ -17,6 +17,9 @@ import meshes
 from bh.commands.run import solve
 from bh.live import Session
 from bh.scene.load import load_scene
+from bh.solvers.load_control import LoadControl
+from bh.solvers.newton import Newton
+from bh.studio import branch
 from bh.studio.desk import Desk
 from bh.studio.messages import read
 from bh.studio.sheets import of_file, of_library, of_model
@@ -96,6 +99,34 @@ def test_the_branch_of_a_run_is_told_as_such() -> None:
     assert desk.from_flat(lambda: False) is None
     assert told(desk)["said"] == "ends here"
     assert not desk.session.left
+
+
+def test_a_run_from_flat_that_snaps_may_end_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the same shape downhill: a run would follow the branch round its limit points, so the state is kept."""
+    desk = Desk(of_library("arc"))
+    for percent in (20.0, 15.0):
+        take(desk, do="percent", value=percent)
+        desk.session.rest()
+    downhill = LoadControl(newton=Newton(full=1, globalised=1))
+    monkeypatch.setattr(branch, "Session", lambda model, settles: Session(model, downhill, settles=settles))
+    assert told(desk) == {
+        "kind": "branch",
+        "here": False,
+        "said": "snaps on its way, and may end elsewhere",
+    }
+    assert desk.session.left
+
+
+def test_a_scene_whose_branch_is_not_known_in_time_brings_its_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bh.studio.desk.from_flat", lambda *_: None)
+    desk = Desk(of_library("arc"))
+    for percent in (20.0, 15.0):
+        take(desk, do="percent", value=percent)
+        desk.session.rest()
+    file, said = take(desk, do="export", what="scene")
+    assert "--resume" in str(said["text"])
+    with zipfile.ZipFile(io.BytesIO(base64.b64decode(str(file["data"])))) as archive:
+        assert "arc-out/path.bh" in archive.namelist()
 
 
 @pytest.mark.slow
