@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bh.live import Controls, Frame, Session
+from bh.live import Frame, Session
+from bh.runtime.progress import Silent
+from bh.solvers.automatic import Automatic
+from bh.solvers.load_control import LoadControl
+from bh.solvers.newton import Newton, Solution
+from bh.solvers.system import System
+from bh.solving.trace import trace
+
+Array = NDArray[np.float64]
 
 SAME = 1e-5  # of the sheet's size: what a state may be off on the same branch
-PIECE = 0.05  # s of work between two looks whether it is to end
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,36 +42,80 @@ class FromFlat:
         return {"kind": "branch", "here": self.here, "said": self.said}
 
 
-def from_flat(session: Session, frame: Frame, settles: bool, going: Callable[[], bool]) -> FromFlat | None:
-    """Fold the sheet anew from flat, in one step, and pull on it in a second one, as its scene does.
+def from_flat(session: Session, frame: Frame, going: Callable[[], bool]) -> FromFlat | None:
+    """Fold the sheet anew from flat and pull on it in a second step, as its scene does, and `bh run` with it.
+
+    Another way of solving would not do: a run follows a branch round its limit points and changes to a stable one
+    where branches meet, so it may end elsewhere than what came from flat by larger increments.
 
     Args:
         session: the handling of the sheet; it is not changed.
         frame: its state at rest.
-        settles: its springs move it downhill to rest where a branch ends.
-        going: asked between two pieces of work; False ends it.
+        going: asked at every iteration; False ends it.
 
     Returns:
         where that ends; None where it was ended.
     """
     if session.straight:
         return FromFlat(True, "ends here: it came this way")
-    anew, wanted = Session(session.model, settles=settles), frame.wanted
-    for part in (Controls(wanted.folds), Controls(wanted.folds, wanted.grips)):
-        anew.ask(part)
-        there = anew.update(0.0)
-        while not there.at_rest:
-            if not going():
-                return None
-            there = anew.update(PIECE)
-            if there.note:
-                return FromFlat(False, f"does not get here: {there.note}")
+    model = session.scene()
+    if not model.steps:
+        return FromFlat(True, "ends here: nothing acts")
+    run = Automatic(load=LoadControl(newton=_Heeding(going=going)))
+    try:
+        path = trace(model, strategy=run, progress=_Heed(going), warn=False, neighbours=False)
+    except _EndedError:
+        return None
+    if not path.reached:
+        return FromFlat(False, f"does not get here: it ends early, {path.outcome}")
+    there = path[-1]
     off = float(np.linalg.norm(there.points - frame.points, axis=1).max())
-    if anew.left:  # a run follows the branch round its limit points and may go anywhere
-        return FromFlat(False, "snaps on its way, and may end elsewhere")
     if off <= SAME * float(np.ptp(session.mesh.points, axis=0).max()):
         return FromFlat(True, "ends here")
-    ends = (
-        f"{there.state.energy.total:.4g} N mm there, {frame.state.energy.total:.4g} here, {off:.3g} mm apart"
-    )
+    ends = f"{there.energy.total:.4g} N mm there, {frame.state.energy.total:.4g} here, {off:.3g} mm apart"
     return FromFlat(False, f"ends on another branch: {ends}")
+
+
+class _EndedError(Exception):
+    """Somebody asked for something else."""
+
+
+@dataclass(frozen=True)
+class _Heed(Silent):
+    """Ends a run between two increments."""
+
+    going: Callable[[], bool]
+
+    def update(self, step: int, steps: int, lam: float, iterations: int, energy: float) -> None:
+        """See `ProgressMeter`."""
+        super().update(step, steps, lam, iterations, energy)
+        if not self.going():
+            raise _EndedError
+
+
+@dataclass(frozen=True)
+class _Heeding(Newton):
+    """Newton's method as a run has it, which can be ended between two iterations."""
+
+    going: Callable[[], bool] = lambda: True
+
+    def full_steps(
+        self, system: System, q: Array, lam: float, forces: Array | None = None
+    ) -> Generator[Array, None, Solution]:
+        """See `Newton`."""
+        return self._heeded(super().full_steps(system, q, lam, forces))
+
+    def globalised_steps(self, system: System, q: Array, lam: float) -> Generator[Array, None, Solution]:
+        """See `Newton`."""
+        return self._heeded(super().globalised_steps(system, q, lam))
+
+    def _heeded(self, steps: Generator[Array, None, Solution]) -> Generator[Array, None, Solution]:
+        while True:
+            if not self.going():
+                raise _EndedError
+            try:
+                q = next(steps)
+            except StopIteration as end:
+                found: Solution = end.value
+                return found
+            yield q

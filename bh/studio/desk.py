@@ -415,7 +415,7 @@ class Desk:
         if not frame.at_rest:
             return None
         if self._flat is None or self._flat[0] is not frame.state:
-            found = from_flat(session, frame, self.sheet.settles, going)
+            found = from_flat(session, frame, going)
             if found is None:
                 return None
             self._flat = frame.state, found

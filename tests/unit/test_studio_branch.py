@@ -7,6 +7,7 @@ import io
 import json
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,6 @@ import meshes
 from bh.commands.run import solve
 from bh.live import Session
 from bh.scene.load import load_scene
-from bh.solvers.load_control import LoadControl
-from bh.solvers.newton import Newton
 from bh.studio import branch
 from bh.studio.desk import Desk
 from bh.studio.messages import read
@@ -101,20 +100,35 @@ def test_the_branch_of_a_run_is_told_as_such() -> None:
     assert not desk.session.left
 
 
-def test_a_run_from_flat_that_snaps_may_end_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At the same shape downhill: a run would follow the branch round its limit points, so the state is kept."""
+def test_a_run_from_flat_that_ends_early_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As `bh run` would; the state is kept."""
     desk = Desk(of_library("arc"))
     for percent in (20.0, 15.0):
         take(desk, do="percent", value=percent)
         desk.session.rest()
-    downhill = LoadControl(newton=Newton(full=1, globalised=1))
-    monkeypatch.setattr(branch, "Session", lambda model, settles: Session(model, downhill, settles=settles))
-    assert told(desk) == {
-        "kind": "branch",
-        "here": False,
-        "said": "snaps on its way, and may end elsewhere",
-    }
+    stopped = SimpleNamespace(reached=False, outcome="unstable")
+    monkeypatch.setattr(branch, "trace", lambda *_, **__: stopped)
+    answer = told(desk)
+    assert not answer["here"]
+    assert answer["said"] == "does not get here: it ends early, unstable"
     assert desk.session.left
+
+
+def test_a_run_from_flat_ends_between_two_iterations_when_it_is_told_to() -> None:
+    desk = Desk(of_library("arc"))
+    for percent in (60.0, 50.0):
+        take(desk, do="percent", value=percent)
+        desk.frame = desk.session.rest()
+    asked = 0
+
+    def going() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked < 7
+
+    assert desk.from_flat(going) is None
+    assert asked == 7
+    assert told(desk)["here"]
 
 
 def test_a_scene_whose_branch_is_not_known_in_time_brings_its_state(monkeypatch: pytest.MonkeyPatch) -> None:
