@@ -311,13 +311,15 @@ class Session:
 
         Returns:
             a model for `bh.trace`; where the sheet has `left` its branch on its way here, it may end on another one.
+            Panels pass through each other in it where they do so here, which a run would else look for.
         """
         folds = tuple(fold_of(self.model, name, angle) for name, angle in self._wanted.folds.items())
         pulls: tuple[Actuation, ...] = tuple(
             Pull(node, grip.to, grip.stiffness) for node, grip in self._wanted.grips.items()
         )
         steps = [Step(items) for items in (folds, pulls) if items]
-        return replace(self.model, steps=tuple(steps))
+        contact = self.model.contact if self.model.stops_itself else False
+        return replace(self.model, contact=contact, steps=tuple(steps))
 
     # ------------------------------------------------------------------------------- its own
 

@@ -375,13 +375,14 @@ class Desk:
         frame = self.frame
         if not frame.at_rest:
             return None
-        if self._finer is None or self._finer[0] is not frame.state:
+        known = self._finer  # read once: another thread may put another sheet on the desk
+        if known is None or known[0] is not frame.state:
             found = finer(self.sheet.model, frame, going)
             give_back()  # the factors of its meshes: it may be long until the next wish
             if found is None:
                 return None
-            self._finer = frame.state, found
-        found = self._finer[1]
+            known = self._finer = frame.state, found
+        found = known[1]
         meets = len(self_contact(frame.state))
         head: Json = {
             "kind": "finer",
@@ -414,14 +415,15 @@ class Desk:
         frame, session = self.frame, self.session
         if not frame.at_rest:
             return None
-        if self._flat is None or self._flat[0] is not frame.state:
+        known = self._flat
+        if known is None or known[0] is not frame.state:
             found = from_flat(session, frame, going)
-            if found is None:
+            if found is None or not going():  # it may be of what was asked meanwhile
                 return None
-            self._flat = frame.state, found
+            known = self._flat = frame.state, found
             if not found.here:
                 session.leave(frame.state)
-        return self._flat[1]
+        return known[1]
 
     def describe(self) -> Json:
         """The sheet as a window draws it: flat, with its creases by name; what it had is gone."""

@@ -315,9 +315,12 @@ class Window(tornado.websocket.WebSocketHandler):
         try:
             found = await run(self.studio.pool, desk.finer, going.is_set, heard)
         except Exception as error:
-            await self._say({"kind": "line", "text": f"no finer mesh ({type(error).__name__}: {error})"})
+            if going.is_set():
+                await self._say({"kind": "line", "text": f"no finer mesh ({type(error).__name__}: {error})"})
             return
-        if found is not None and going.is_set():
+        if not going.is_set():
+            return
+        if found is not None:
             await self.write_message(found, binary=True)
         try:
             flat = await run(self.studio.pool, desk.from_flat, going.is_set)
