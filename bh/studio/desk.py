@@ -68,6 +68,9 @@ class Desk:
             sheet: to be handled.
             controls: as it was handled before; None for flat, or as it is drawn.
             there: where it lay when it was on the desk before; None for a new one.
+
+        Raises:
+            InputError: it cannot be handled; the desk is as before.
         """
         model = sheet.model if sheet.model.supports else held(sheet.model)
         session = Session(model, settles=sheet.settles)
@@ -75,15 +78,23 @@ class Desk:
             session.ask(controls)
         if there is not None:
             session.go_back(there)
+        frame = session.update(0.0)
+        colours = offered(frame.state)
+        # nothing is laid before all of it is known to be good
         self.sheet = sheet if model is sheet.model else replace(sheet, model=model)
-        self.session = session
-        self.frame = self.session.update(0.0)
+        self.session, self.frame, self._colours = session, frame, colours
         self._finer = None  # it is of another sheet
         give_back()
-        self._colours = offered(self.frame.state)
-        if self._colour != "none" and self._colour not in self._colours:
+        if self._colour != "none" and self._colour not in colours:
             self._colour = "bending"
         self._shown = ()
+
+    def anew(self) -> None:
+        """Begin anew with the sheet, or where that breaks, too, with a pattern of the library."""
+        try:
+            self.put(self.sheet)
+        except Exception:  # whatever it was, the window goes on
+            self.put(of_library("arc"))
 
     def take(self, message: asked.Asked) -> list[Json]:
         """Do what a window asks.

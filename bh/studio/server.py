@@ -228,12 +228,13 @@ class Window(tornado.websocket.WebSocketHandler):
             task.add_done_callback(known.discard)
 
     async def _work(self) -> None:
-        run = asyncio.get_running_loop().run_in_executor
+        run, pool = asyncio.get_running_loop().run_in_executor, self.studio.pool
         try:
-            desk = self.desk = await run(self.studio.pool, self.studio.desk)
-        except InputError as error:
-            await self._say({"kind": "line", "text": str(error), "bad": True})
-            return
+            desk = await run(pool, self.studio.desk)
+        except Exception as error:
+            await self._say(_told(error, "another one is there"))
+            desk = await run(pool, Desk)
+        self.desk = desk
         await self._say(desk.describe())
         while True:
             try:
@@ -241,8 +242,8 @@ class Window(tornado.websocket.WebSocketHandler):
             except WebSocketClosedError:
                 raise
             except Exception as error:  # a sheet that breaks takes its session down, not the server
-                await self._say(_fault(error))
-                desk.put(desk.sheet)
+                await self._say(_told(error, "the sheet begins anew"))
+                await run(pool, desk.anew)
                 await self._say(desk.describe())
 
     async def _next(self, desk: Desk) -> None:
@@ -335,10 +336,8 @@ class Window(tornado.websocket.WebSocketHandler):
         run = asyncio.get_running_loop().run_in_executor
         try:
             answers = await run(self.studio.pool, lambda: desk.take(read(message)))
-        except InputError as error:
-            answers = [{"kind": "line", "text": str(error), "bad": True}]
         except Exception as error:
-            answers = [_fault(error)]
+            answers = [_told(error, "the sheet stays as it was")]
         for answer in answers:
             await self._say(answer)
 
@@ -359,7 +358,7 @@ def allowed(request: tornado.httputil.HTTPServerRequest, token: str, wanted: str
 
 
 def newest(waiting: Sequence[str | bytes]) -> list[str | bytes]:
-    """Messages that are worth doing: of moves of the same slider or point only the last.
+    """Messages that are worth doing: of moves of the same slider or point with nothing else between only the last.
 
     Args:
         waiting: in the order in which they came.
@@ -367,8 +366,18 @@ def newest(waiting: Sequence[str | bytes]) -> list[str | bytes]:
     Returns:
         the others left out, in the same order.
     """
-    last = {_subject(message): number for number, message in enumerate(waiting)}
-    return [m for number, m in enumerate(waiting) if _subject(m) is None or last[_subject(m)] == number]
+    kept: list[str | bytes] = []
+    later: set[tuple[object, ...]] = set()  # what is moved again before anything else is asked
+    for message in reversed(waiting):
+        subject = _subject(message)
+        if subject is None:
+            later.clear()
+        elif subject in later:
+            continue
+        else:
+            later.add(subject)
+        kept.append(message)
+    return kept[::-1]
 
 
 def _subject(message: str | bytes) -> tuple[object, ...] | None:
@@ -382,9 +391,12 @@ def _subject(message: str | bytes) -> tuple[object, ...] | None:
     return str(data["do"]), *(repr(data.get(key)) for key in ("crease", "node", "a", "b"))
 
 
-def _fault(error: Exception) -> dict[str, object]:
-    text = f"a fault of the program ({type(error).__name__}: {error}); the sheet begins anew"
-    return {"kind": "line", "text": text, "bad": True}
+def _told(error: Exception, then: str) -> dict[str, object]:
+    """A line for what was refused, or for a fault of the program and what becomes of the sheet."""
+    text = str(error)
+    if not isinstance(error, InputError):
+        text = f"a fault of the program ({type(error).__name__}: {text}); {then}"
+    return {"kind": "line", "text": " ".join(text.split()), "bad": True}
 
 
 def open_window(
