@@ -121,6 +121,11 @@ class Session:
         return self._wanted
 
     @property
+    def controls(self) -> Controls:
+        """What the newest state is in equilibrium with: `wanted` at rest, else what it has come to."""
+        return self._now()
+
+    @property
     def creases(self) -> tuple[str, ...]:
         """Creases that can be folded."""
         return tuple(self._wanted.folds)

@@ -22,7 +22,7 @@ from bh.runtime.memory import give_back
 from bh.solving.trace import trace
 from bh.studio.branch import FromFlat, from_flat
 from bh.studio.colours import offered, top_of
-from bh.studio.exports import export, film, moving
+from bh.studio.exports import beside, export, film, moving
 from bh.studio.finer import Finer, finer
 from bh.studio.frames import Json, creases_of, described, line, packed, surface
 from bh.studio.pictures import Pictures
@@ -112,7 +112,8 @@ class Desk:
             return self._plain(message.do)
         before, asked_before = self._was(), (self._now(), self.material)
         answers = [self.describe()] if self._laid(message) else self._done(message)
-        if (self._now(), self.material) != asked_before:
+        # a file is no stroke, though jaws may have moved while the sheet came to rest for it
+        if (self._now(), self.material) != asked_before and not isinstance(message, asked.Export):
             self._remember(message, before)
         return answers
 
@@ -149,12 +150,10 @@ class Desk:
                 self._paint(by)
             case asked.Export(what=what):
                 self.frame = self._rest()
-                if what in ("scene", "python"):
-                    ends = time.monotonic() + LONGEST_REST
-                    if self.from_flat(lambda: time.monotonic() < ends) is None and self.frame.at_rest:
-                        self.session.leave(self.frame.state)  # not known in time
+                if what in ("scene", "python") and not self._flat_known():
+                    self.session.leave(self.frame.state)
                 name, data = export(what, self.sheet, self.session, self.frame)
-                return [_file(name, data), *self._behind_a_snap(what, name)]
+                return [_file(name, data), *map(line, beside(what, name, self.session, self.frame))]
             case asked.Film(pictures=pictures, ms=ms, kind=kind):
                 name = f"{Path(self.sheet.name).stem or 'sheet'}.{kind}"
                 return [_file(name, film(pictures, ms) if kind == "gif" else moving(pictures, ms))]
@@ -216,17 +215,13 @@ class Desk:
                 f"{what} {far:.3g} mm away, the sheet is {size:.3g} mm wide; stay within {FARTHEST:g} times that"
             )
 
-    def _behind_a_snap(self, what: str, name: str) -> list[Json]:
-        """What to know of a scene whose state a run from flat may miss."""
-        if what not in ("scene", "python") or not self.session.left:
-            return []
-        stem = Path(name).stem
-        how = (
-            f"`bh run {stem}.toml --resume` begins in the state that is saved with it"
-            if what == "scene"
-            else "the lines begin flat and may end elsewhere; the scene has the state"
-        )
-        return [line(f"{name} is saved; it was reached round a snap or by way of a snap: {how}")]
+    def _flat_known(self) -> bool:
+        """Whether it is known where a run from flat ends: not of a sheet on its way, or in time, or where it breaks."""
+        ends = time.monotonic() + LONGEST_REST
+        try:
+            return self.from_flat(lambda: time.monotonic() < ends) is not None
+        except Exception:  # the state is good, and is saved itself
+            return False
 
     def _paint(self, by: str) -> None:
         if by != "none" and by not in self._colours:

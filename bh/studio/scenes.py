@@ -1,4 +1,4 @@
-"""The scene of what is in the window, which `bh run` repeats: from flat, or from the state itself after a snap."""
+"""The scene of what is in the window, which `bh run` repeats: from flat, or from the state where that may miss it."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ SETTLING = re.compile(r'^strategy = "settling".*\n', re.MULTILINE)
 def scene_files(stem: str, sheet: LiveSheet, session: Session) -> dict[str, bytes]:
     """The scene and the files that it needs.
 
-    A sheet that has never snapped is where a run from flat along the branch ends. One that has may lie elsewhere: its
-    scene comes with the state as a path that was stopped after the first of two steps, from which
-    `bh run SCENE --resume` goes on; the second step holds everything where it is, and solves it anew.
+    A sheet that has kept to its branch is where a run from flat ends. Another one may lie elsewhere: its scene comes
+    with the state as a path that was stopped after the first of two steps, from which `bh run SCENE --resume` goes on;
+    the second step holds everything where it is, and solves it anew.
 
     Args:
         stem: name of the scene without its suffix.
         sheet: what was opened.
-        session: its handling, at rest.
+        session: its handling; of one that is not at rest the newest state is saved.
 
     Returns:
         bytes by name, the scene first.
@@ -54,7 +54,7 @@ def scene_files(stem: str, sheet: LiveSheet, session: Session) -> dict[str, byte
 def scene_text(sheet: LiveSheet, session: Session) -> str:
     """The scene that `bh run` repeats: the same mesh and supports, one step that folds and one that pulls.
 
-    After a snap both are one step, and the same once more, as `scene_files` says.
+    Where that may end elsewhere both are one step, and the same once more, as `scene_files` says.
 
     Args:
         sheet: what was opened.
@@ -71,7 +71,7 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
     lines = [f"# {sheet.name} as it stood in bh studio; mm, N, rad."]
     lines += (
         [
-            "# It was reached round a snap or by way of a snap: a run from flat may end elsewhere. It is kept beside:",
+            "# A run from flat may end elsewhere, as by way of a snap. The state is kept beside:",
             f"#     bh run {stem}.toml --resume",
             "# begins there, and its second step solves it anew. `bh run --force` begins flat.",
         ]
@@ -129,11 +129,11 @@ def _crease_lines(session: Session) -> list[str]:
 
 def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
     rows, strips = [], session.mesh.wide_creases
-    for name, wanted in session.wanted.folds.items():
+    for name, angle in session.controls.folds.items():
         if name in strips:
-            rows.append(f"  {{ crease = {quoted(name)}, rest = {math.pi - wanted!r} }},")
+            rows.append(f"  {{ crease = {quoted(name)}, rest = {math.pi - angle!r} }},")
             continue
-        angle = sheet.sense(name) * wanted + 0.0  # without -0.0
+        angle = sheet.sense(name) * angle + 0.0  # without -0.0
         spring = _stiffness(session, name)
         rows.append(f"  {{ crease = {quoted(name)}, by = {angle!r}{', ' if spring else ''}{spring} }},")
     return ["fold = [", *rows, "]"]
@@ -144,7 +144,7 @@ def _pull_lines(session: Session, still: bool = False) -> list[str]:
     rows = [
         f"  {{ node = {node}, to = {list(grip.to)}, stiffness = {grip.stiffness!r}"
         f"{f', start = {list(grip.to)}' if still else ''} }},"
-        for node, grip in session.wanted.grips.items()
+        for node, grip in session.controls.grips.items()
     ]
     return ["pull = [", *rows, "]"] if rows else []
 

@@ -13,6 +13,7 @@ import pytest
 
 import bh
 import meshes
+from bh.commands.run import solve
 from bh.errors import InputError
 from bh.live import Frame, Session
 from bh.scene.load import load_scene
@@ -165,3 +166,71 @@ def test_a_refused_file_is_named_as_it_was_dropped(name: str) -> None:
         of_file(name, data)
     assert str(told.value).lstrip("'").startswith(name)
     assert "bh-studio-" not in str(told.value)
+
+
+def test_a_sheet_that_cannot_go_on_is_saved_where_it_lies(tmp_path: Path) -> None:
+    """Not where it is asked to be: its scene has the controls that it is in equilibrium with, and its state."""
+    desk = Desk()
+    take(desk, do="percent", value=30.0)
+    desk.session.update(0.0)
+    march = desk.session._under.march
+    march._increment = 0.2
+    while march.here.lam == 0.0:
+        desk.session.update(1e-9)
+    march.stuck = "no way on"
+    file, said = take(desk, do="export", what="scene")
+    assert "cannot go on (no way on): it is saved as it lies" in str(said["text"])
+    assert desk.frame.note
+    assert 0.0 < desk.frame.fold_angles()["crease"] < 0.29 * np.pi
+    (tmp_path / "arc.zip").write_bytes(base64.b64decode(str(file["data"])))
+    with ZipFile(tmp_path / "arc.zip") as archive:
+        archive.extractall(tmp_path)
+    scene = load_scene(tmp_path / "arc.toml")
+    resumed = solve(scene, tmp_path / "arc-out", resume=True, estimate=False, neighbours=False).path
+    for path in (resumed, bh.trace(scene.model)):
+        assert path.reached
+        np.testing.assert_allclose(path[-1].points, desk.frame.points, atol=1e-6)
+    lines, told = take(desk, do="export", what="python")
+    angle = desk.frame.controls.folds["crease"]
+    assert f'{{"crease": {angle!r}}}' in base64.b64decode(str(lines["data"])).decode()
+    assert "as it lies" in str(told["text"])
+
+
+@pytest.mark.parametrize(
+    "error", [InputError("no"), MemoryError(), RuntimeError("Factor is exactly singular")]
+)
+def test_a_run_from_flat_that_breaks_does_not_keep_a_state_from_being_saved(
+    monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    """It comes with its state, as one whose branch is not known in time."""
+
+    def breaks(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("bh.studio.desk.from_flat", breaks)
+    desk = Desk()
+    take(desk, do="percent", value=10.0)
+    settled(desk)
+    file, said = take(desk, do="export", what="scene")
+    assert file["name"] == "arc.zip"
+    assert "--resume" in str(said["text"])
+
+
+def test_a_file_is_nothing_to_take_back() -> None:
+    """Jaws that float move while the sheet comes to rest for it: that is no stroke, and redo is kept."""
+    desk = Desk()
+    take(desk, do="percent", value=30.0)
+    right = settled(desk).points[:, 0]
+    jaws = {"a": int(np.argmin(right)), "b": int(np.argmax(right))}
+    take(desk, do="pinch", **jaws)
+    settled(desk)
+    gap = desk.session.wanted.jaws[0].gap(desk.session.wanted.grips)
+    for part in (0.9, 0.8):
+        take(desk, do="pinch", **jaws, gap=part * gap)
+    take(desk, do="undo")
+    wanted, past = desk.session.wanted, len(desk._past)
+    take(desk, do="export", what="result")
+    assert desk.session.wanted != wanted
+    assert len(desk._past) == past
+    take(desk, do="redo")
+    assert desk.session.wanted.jaws[0].gap(desk.session.wanted.grips) == pytest.approx(0.8 * gap, rel=1e-9)
