@@ -19,8 +19,7 @@ from bh.live import Controls, Frame, Mark, Session, held
 from bh.live.holding import handled
 from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
-from bh.solving.trace import trace
-from bh.studio.branch import FromFlat, from_flat
+from bh.studio.branch import FromFlat, check, from_flat
 from bh.studio.colours import offered, top_of
 from bh.studio.exports import beside, export, film, moving
 from bh.studio.finer import Finer, finer
@@ -96,11 +95,12 @@ class Desk:
         except Exception:  # whatever it was, the window goes on
             self.put(of_library("arc"))
 
-    def take(self, message: asked.Asked) -> list[Json]:
+    def take(self, message: asked.Asked, alone: Callable[[], bool] = lambda: True) -> list[Json]:
         """Do what a window asks.
 
         Args:
             message: checked.
+            alone: whether nothing else is asked yet, for which a check gives way.
 
         Returns:
             answers, beside the frames: a new sheet, a file, a line.
@@ -109,7 +109,7 @@ class Desk:
             InputError: it cannot be done; the desk is as before.
         """
         if isinstance(message, asked.Plain):
-            return self._plain(message.do)
+            return self._plain(message.do, alone)
         before, asked_before = self._was(), (self._now(), self.material)
         answers = [self.describe()] if self._laid(message) else self._done(message)
         # a file is no stroke, though jaws may have moved while the sheet came to rest for it
@@ -180,9 +180,9 @@ class Desk:
                 return False
         return True
 
-    def _plain(self, what: str) -> list[Json]:
+    def _plain(self, what: str, alone: Callable[[], bool]) -> list[Json]:
         if what == "check":
-            return [self._check()]
+            return [line(check(self.session, self._rest(), alone))]
         now = self._was()
         if what == "flatten":
             flat = Controls(dict.fromkeys(self.session.creases, 0.0))
@@ -264,21 +264,6 @@ class Desk:
         frame = self.session.rest(LONGEST_REST)
         self._snapped = self._snapped or frame.snapped
         return frame
-
-    def _check(self) -> Json:
-        """The same state by a run from flat, on this mesh and on a coarser one: how far it is off."""
-        frame = self._rest()
-        if not any(step.actuations for step in self.session.scene().steps):
-            return line("there is nothing to check yet")
-        path = trace(self.session.scene(), estimate=True, warn=False)
-        off = float(np.abs(path[-1].points - frame.points).max())
-        error = path.accuracy
-        estimate = (
-            f"its energy is off by about {100.0 * error.estimate:.2g} % on this mesh"
-            if error is not None and error.estimate is not None
-            else f"its error on this mesh is not known: {path.estimate_reason}"
-        )
-        return line(f"a run from flat ends as {path.outcome}, at most {off:.2g} mm from here; {estimate}")
 
     # ------------------------------------------------------------------------------- what is shown
 

@@ -8,7 +8,7 @@ import json
 import secrets
 import threading
 import time
-from collections.abc import Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -279,8 +279,11 @@ class Window(tornado.websocket.WebSocketHandler):
         waiting = []
         while not self.queue.empty():
             waiting.append(self.queue.get_nowait())
-        for message in newest(waiting):
-            await self._do(desk, message)
+        left = newest(waiting)
+        while left:
+            await self._do(
+                desk, left.pop(0), lambda: not left and self.queue.empty() and self.desk is not None
+            )
         self.taken += len(waiting)
 
     def _due(self, desk: Desk) -> bool:
@@ -331,11 +334,11 @@ class Window(tornado.websocket.WebSocketHandler):
         if told is not None and going.is_set():
             await self._say(told)
 
-    async def _do(self, desk: Desk, message: str | bytes) -> None:
+    async def _do(self, desk: Desk, message: str | bytes, alone: Callable[[], bool]) -> None:
         """One message, answered; the last good state is kept where it cannot be done."""
         run = asyncio.get_running_loop().run_in_executor
         try:
-            answers = await run(self.studio.pool, lambda: desk.take(read(message)))
+            answers = await run(self.studio.pool, lambda: desk.take(read(message), alone))
         except Exception as error:
             answers = [_told(error, "the sheet stays as it was")]
         for answer in answers:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import threading
+import time
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +17,7 @@ import tornado.websocket
 
 from bh.errors import InputError
 from bh.live import Session
+from bh.runtime.progress import ProgressMeter
 from bh.studio import desk as desks
 from bh.studio import server
 from bh.studio.desk import Desk
@@ -152,3 +156,49 @@ def test_undo_goes_over_what_was_asked_in_one_breath() -> None:
         desk.take(read(message))
     assert desk.sheet.model.sheet.t == 0.5
     np.testing.assert_allclose(list(desk.session.wanted.folds.values()), 0.2 * np.pi)
+
+
+def endless(*_: object, progress: ProgressMeter, **__: object) -> None:
+    """A run that tells of its increments and does not come to an end."""
+    ends = time.monotonic() + 15.0
+    while time.monotonic() < ends:
+        progress.update(0, 1, 0.5, 1, 0.0)
+        time.sleep(0.01)
+
+
+def test_a_check_gives_way_to_what_is_asked_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long its run takes: the slider is answered."""
+    monkeypatch.setattr("bh.studio.branch.trace", endless)
+    asked: list[dict[str, object]] = [{"do": "percent", "value": 10}, {"do": "check"}, {"do": "check"}]
+    began = time.monotonic()
+    told = visited(lambda told: len(lines(told)) > 1, *asked, {"do": "export", "what": "no such"})
+    assert lines(told)[:2] == ["the check was ended by what was asked next"] * 2
+    assert time.monotonic() - began < 10.0
+
+
+def test_a_window_that_is_closed_ends_its_check(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = threading.Event()
+
+    def run(*given: object, progress: ProgressMeter, **more: object) -> None:
+        begun.set()
+        endless(*given, progress=progress, **more)
+
+    monkeypatch.setattr("bh.studio.branch.trace", run)
+
+    async def visit() -> None:
+        studio = Studio()
+        site, address = studio.serve()
+        where = address.replace("http", "ws").replace("/?", "/socket?")
+        client = await tornado.websocket.websocket_connect(where)
+        await client.write_message(json.dumps({"do": "percent", "value": 10}))
+        await client.write_message(json.dumps({"do": "check"}))
+        while not begun.is_set():
+            await asyncio.sleep(0.01)
+        (desk,) = [weakref.ref(window.desk) for window in studio.windows if window.desk is not None]
+        client.close()
+        while desk() is not None:
+            await asyncio.sleep(0.05)
+            gc.collect()
+        await studio.close(site)
+
+    asyncio.run(asyncio.wait_for(visit(), 10.0))
