@@ -241,7 +241,7 @@ class Desk:
     def _turn(self, sheet: LiveSheet) -> None:
         """The same handling of other kinds of creases; one that was flat goes as far as the others have gone."""
         wanted = self.session.wanted
-        parts = [angle / sheet.full[name] for name, angle in wanted.folds.items()]
+        parts = [angle / sheet.full[name] for name, angle in wanted.folds.items() if sheet.full[name]]
         gone = float(np.median(parts)) if parts else 0.0
         names = handled(sheet.model.mesh)
         folds = {name: wanted.folds.get(name, gone * sheet.full[name]) for name in names}
