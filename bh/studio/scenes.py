@@ -6,16 +6,19 @@ import json
 import math
 import re
 import tempfile
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 from bh.errors import InputError
 from bh.live import Session
-from bh.model.supports import Support
+from bh.model.hinge_laws import LAWS, HingeLaw
+from bh.model.sheet import Sheet
+from bh.model.supports import RigidBody, Support
 from bh.paths.path import Path as Trace
 from bh.paths.record import Record, StepOutcome
 from bh.scene.load import parse_scene
 from bh.solvers.outcome import Outcome
+from bh.studio.scene_sheets import written
 from bh.studio.sheets import LiveSheet, quoted
 
 BALANCED = (
@@ -95,36 +98,62 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
 
 
 def _sheet_lines(session: Session) -> list[str]:
-    given = session.model.sheet
-    values = {item.name: getattr(given, item.name) for item in fields(given)}
-    return ["[sheet]", *(f"{key} = {value!r}" for key, value in values.items() if value is not None), ""]
+    values = _sheet_values(session.model.sheet)
+    return ["[sheet]", *(f"{key} = {written(value)}" for key, value in values.items()), ""]
+
+
+def _sheet_values(sheet: Sheet) -> dict[str, object]:
+    """Values by key; of a laminate its plies alone, which all of them come from."""
+    if sheet.plies is not None:
+        return {"plies": [_sheet_values(ply) for ply in sheet.plies]}
+    values = {item.name: getattr(sheet, item.name) for item in fields(sheet)}
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def _support_lines(session: Session) -> list[str]:
     lines = []
     for support in session.model.supports:
-        assert isinstance(support, Support)
+        if isinstance(support, RigidBody):
+            lines += ["[[supports]]", 'at = "rigid-body"', ""]
+            continue
+        if not isinstance(support, Support):
+            raise InputError(
+                f"{type(support).__name__} is a support of your own, which the window cannot write; take the scene it is from"
+            )
         at = support.at if isinstance(support.at, str) else list(support.at)
         fix = (
             support.fix if isinstance(support.fix, str) else [list(map(float, axis)) for axis in support.fix]
         )
-        lines += ["[[supports]]", f"at = {json.dumps(at)}", f"fix = {json.dumps(fix)}", ""]
+        clamp = ["clamp = true"] if support.clamp else []
+        lines += ["[[supports]]", f"at = {json.dumps(at)}", f"fix = {json.dumps(fix)}", *clamp, ""]
     return lines
 
 
 def _stiffness(session: Session, crease: str) -> str:
-    """The key of a crease that is a spring; an empty string where its angle is imposed."""
+    """The key of a crease that is a spring; an empty string where its angle is imposed, or its law has a stiffness."""
     law = session.model.creases.get(crease)
-    if law is None:
+    if law is None or (law.Lstar is None and law.stiffness is None):
         return ""
     return f"Lstar = {law.Lstar!r}" if law.Lstar is not None else f"stiffness = {law.stiffness!r}"
 
 
 def _crease_lines(session: Session) -> list[str]:
     lines = []
-    for name in session.model.creases:
-        lines += [f"[creases.{quoted(name)}]", _stiffness(session, name), ""]
+    for name, law in session.model.creases.items():
+        lines += [f"[creases.{quoted(name)}]", _stiffness(session, name)]
+        lines += [f"rest = {law.rest!r}"] if law.rest != math.pi else []
+        lines += [f"law = {written(_law_values(name, law.law))}", ""] if law.law is not None else [""]
     return lines
+
+
+def _law_values(crease: str, law: HingeLaw) -> dict[str, object]:
+    """The table of a law that is no straight line."""
+    kind = next((kind for kind, known in LAWS.items() if type(law) is known), None)
+    if kind is None or not is_dataclass(law):
+        raise InputError(
+            f"the law of crease '{crease}' is one of your own, which the window cannot write; take the scene it is from"
+        )
+    return {"kind": kind, **{item.name: getattr(law, item.name) for item in fields(law)}}
 
 
 def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:

@@ -234,3 +234,39 @@ def test_a_file_is_nothing_to_take_back() -> None:
     assert len(desk._past) == past
     take(desk, do="redo")
     assert desk.session.wanted.jaws[0].gap(desk.session.wanted.grips) == pytest.approx(0.8 * gap, rel=1e-9)
+
+
+E4000 = "E = 4000.0\nnu = 0.3\nt = 0.2\n"
+
+
+@pytest.mark.parametrize(
+    ("sheet", "more"),
+    [
+        (E4000, '[[supports]]\nat = "edge:inner"\nclamp = true'),
+        (E4000, '[[supports]]\nat = "rigid-body"'),
+        (E4000 + "expansion = [1e-5, 2e-5]", ""),
+        ("plies = [{ E = 4000.0, nu = 0.3, t = 0.1 }, { E = 2000.0, nu = 0.3, t = 0.1 }]", ""),
+        (E4000, '[creases.crease-1]\nLstar = 20\nrest = 2.9\nlaw = { kind = "softening", peak = 0.2 }'),
+        (
+            E4000,
+            "[creases.crease-1.law]\nkind = 'table'\nturns = [-1.0, 0.0, 1.0]\nmoments = [-0.1, 0.0, 0.3]",
+        ),
+    ],
+    ids=["clamp", "rigid-body", "expansion", "plies", "softening", "table"],
+)
+def test_a_scene_comes_out_with_all_that_its_sheet_is(sheet: str, more: str, tmp_path: Path) -> None:
+    """Supports, sheet and creases of every kind that a scene may give: a run ends in what is seen."""
+    head, rest = SCENE.split("[sheet]")
+    steps = rest[rest.index("[[steps]]") :].replace('rest = "2.1rad"', "by = 0.4")
+    first, second = (tmp_path / name for name in ("ring.toml", "saved.toml"))
+    first.write_text(f"{head}[sheet]\n{sheet}\n{more}\n{steps}")
+    desk = Desk(sheet_of(first, "card"))
+    take(desk, do="percent", value=20.0)
+    frame = settled(desk)
+    (answer,) = take(desk, do="export", what="scene")
+    second.write_bytes(base64.b64decode(str(answer["data"])))
+    saved = load_scene(second).model
+    assert saved.sheet == desk.session.model.sheet
+    assert dict(saved.creases) == dict(desk.session.model.creases)
+    path = bh.trace(saved, warn=False)
+    np.testing.assert_allclose(path[-1].points, frame.points, atol=1e-6)
