@@ -118,7 +118,7 @@ def _support_lines(session: Session) -> list[str]:
             continue
         if not isinstance(support, Support):
             raise InputError(
-                f"{type(support).__name__} is a support of your own, which the window cannot write; take the scene it is from"
+                f"{type(support).__name__} is a support of your own, which the window cannot write; take its scene"
             )
         at = support.at if isinstance(support.at, str) else list(support.at)
         fix = (
