@@ -68,7 +68,6 @@ class Session:
         self._past: list[Mark] = []
         self._undone: list[Mark] = []
         self._iterations = 0
-        self._stable: bool | None = True
         self._left = False
         self._ways = 0  # that it began behind the one on which it stands at first, and turns on them
         self._seen: tuple[Array, State] | None = None  # the newest state, and the unknowns that it belongs to
@@ -88,7 +87,10 @@ class Session:
 
     @property
     def left(self) -> bool:
-        """Whether it has snapped since it was flat, or lies on another branch (`leave`): a run may end elsewhere."""
+        """Whether it has snapped since the session began, or lies on another branch (`leave`): a run may end elsewhere.
+
+        A way back does not take that away, `undo` and `go_back` do.
+        """
         return self._left
 
     @property

@@ -234,6 +234,8 @@ class Desk:
         if node >= len(mesh.points):
             raise InputError(f"there is no node {node} to hold; choose one of 0 to {len(mesh.points) - 1}")
         other = tuple(s for s in model.supports if getattr(s, "at", None) not in ([node], (node,)))
+        if not on and len(other) == len(model.supports):
+            raise InputError(f"node {node} is not held on its own; change its support in the scene")
         model = replace(model, supports=other)
         model = model.support([node], "xyz") if on else model
         self.put(replace(self.sheet, model=model), self.session.wanted)

@@ -270,3 +270,18 @@ def test_a_scene_comes_out_with_all_that_its_sheet_is(sheet: str, more: str, tmp
     assert dict(saved.creases) == dict(desk.session.model.creases)
     path = bh.trace(saved, warn=False)
     np.testing.assert_allclose(path[-1].points, frame.points, atol=1e-6)
+
+
+def test_a_node_that_is_held_with_others_is_told_as_such(tmp_path: Path) -> None:
+    """Its dot does nothing: that is a line, and the sheet stays."""
+    file = tmp_path / "ring.toml"
+    file.write_text(SCENE.replace("[creases.crease-1]", "[[supports]]\nat = [0, 1, 9]\n[creases.crease-1]"))
+    desk = Desk(sheet_of(file, "card"))
+    session = desk.session
+    for node in (1, 5):
+        with pytest.raises(InputError, match=f"node {node} is not held on its own"):
+            take(desk, do="hold", node=node, on=False)
+    assert desk.session is session
+    take(desk, do="hold", node=5, on=True)
+    take(desk, do="hold", node=5, on=False)
+    assert desk.session.model.supports == session.model.supports
