@@ -24,6 +24,7 @@ from bh.studio.sheets import LiveSheet, quoted
 BALANCED = (
     1e-6  # of forces over the typical one of an element; a state with more is not saved as an equilibrium
 )
+NOTHING = ["force = { at = [0], each = [0.0, 0.0, 0.0] }"]  # of a step in which nothing acts
 SETTLING = re.compile(r'^strategy = "settling".*\n', re.MULTILINE)
 
 
@@ -91,9 +92,10 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
     folds, pulls = _fold_lines(sheet, session), _pull_lines(session)
     if session.left:
         held = _pull_lines(session, still=True)
-        lines += ["[[steps]]", *folds, *pulls, "", "[[steps]]", *folds, *held, ""]
+        lines += ["[[steps]]", *(folds + pulls or NOTHING), "", "[[steps]]", *(folds + held or NOTHING), ""]
     else:
-        lines += ["[[steps]]", *folds, "", *(["[[steps]]", *pulls, ""] if pulls else [])]
+        for step in [each for each in (folds, pulls) if each] or [NOTHING]:
+            lines += ["[[steps]]", *step, ""]
     return "\n".join([*lines, "[outputs]", "pictures = true", ""])
 
 
@@ -165,7 +167,7 @@ def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
         angle = sheet.sense(name) * angle + 0.0  # without -0.0
         spring = _stiffness(session, name)
         rows.append(f"  {{ crease = {quoted(name)}, by = {angle!r}{', ' if spring else ''}{spring} }},")
-    return ["fold = [", *rows, "]"]
+    return ["fold = [", *rows, "]"] if rows else []
 
 
 def _pull_lines(session: Session, still: bool = False) -> list[str]:

@@ -285,3 +285,19 @@ def test_a_node_that_is_held_with_others_is_told_as_such(tmp_path: Path) -> None
     take(desk, do="hold", node=5, on=True)
     take(desk, do="hold", node=5, on=False)
     assert desk.session.model.supports == session.model.supports
+
+
+def test_the_scene_of_a_sheet_without_a_fold_is_run_too(tmp_path: Path) -> None:
+    """Its only crease is made flat: nothing acts, or a pull alone does."""
+    desk = Desk()
+    take(desk, do="crease", crease="crease", kind="flat")
+    saved = tmp_path / "arc.toml"
+    for pull in (False, True):
+        if pull:
+            take(desk, do="pull", node=0, to=[75.0, 0.0, 10.0])
+        frame = settled(desk)
+        (answer,) = take(desk, do="export", what="scene")
+        saved.write_bytes(base64.b64decode(str(answer["data"])))
+        path = bh.trace(load_scene(saved).model)
+        assert path.reached
+        np.testing.assert_allclose(path[-1].points, frame.points, atol=1e-6)
