@@ -11,6 +11,7 @@ from pathlib import Path
 
 from bh.errors import InputError
 from bh.live import Session
+from bh.live.controls import fold_of
 from bh.model.hinge_laws import LAWS, HingeLaw
 from bh.model.sheet import Sheet
 from bh.model.supports import RigidBody, Support
@@ -159,10 +160,11 @@ def _law_values(crease: str, law: HingeLaw) -> dict[str, object]:
 
 
 def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
-    rows, strips = [], session.mesh.wide_creases
+    rows = []
     for name, angle in session.controls.folds.items():
-        if name in strips:
-            rows.append(f"  {{ crease = {quoted(name)}, rest = {math.pi - angle!r} }},")
+        rest = fold_of(session.model, name, angle).rest
+        if rest is not None:
+            rows.append(f"  {{ crease = {quoted(name)}, rest = {rest!r} }},")
             continue
         angle = sheet.sense(name) * angle + 0.0  # without -0.0
         spring = _stiffness(session, name)

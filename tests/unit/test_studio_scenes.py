@@ -265,6 +265,8 @@ def test_a_scene_comes_out_with_all_that_its_sheet_is(sheet: str, more: str, tmp
     frame = settled(desk)
     (answer,) = take(desk, do="export", what="scene")
     second.write_bytes(base64.b64decode(str(answer["data"])))
+    springs = "law" in more
+    assert springs == (abs(frame.fold_angles()["crease-1"] - frame.wanted.folds["crease-1"]) > 1e-4)
     saved = load_scene(second).model
     assert saved.sheet == desk.session.model.sheet
     assert dict(saved.creases) == dict(desk.session.model.creases)
