@@ -160,7 +160,7 @@ class Session:
             stiffness: of the spring, N/mm; None for one that suits the sheet.
 
         Raises:
-            ModelError: no such node, or no point.
+            ModelError: no such node, no point, or no stiffness.
         """
         if not 0 <= node < len(self.mesh.points):
             raise ModelError(
@@ -169,7 +169,7 @@ class Session:
         if len(to) != 3 or not all(math.isfinite(x) for x in to):
             raise ModelError(f"node {node} cannot be pulled to {to}; give three numbers of mm")
         old = self._wanted.grips.get(node)
-        given = stiffness or (old.stiffness if old else self._soft)
+        given = (old.stiffness if old else self._soft) if stiffness is None else stiffness
         x, y, z = (float(c) for c in to)
         self._ask(self._wanted.gripped({node: Grip((x, y, z), given)}))
 
@@ -185,7 +185,7 @@ class Session:
             stiffness: of the spring of each jaw, N/mm; None for one that suits the sheet.
 
         Raises:
-            ModelError: no such node, both at one point, or no gap.
+            ModelError: no such node, both at one point, no gap, or no stiffness.
         """
         if gap is not None and not (math.isfinite(gap) and gap >= 0.0):
             raise ModelError(
@@ -194,7 +194,7 @@ class Session:
         jaws = next((old for old in self._wanted.jaws if (old.a, old.b) == (a, b)), None)
         if jaws is None:
             points = self._state().points
-            jaws = Jaws.on(points, a, b, stiffness or JAWS * self._soft)
+            jaws = Jaws.on(points, a, b, JAWS * self._soft if stiffness is None else stiffness)
             gap = float(np.linalg.norm(points[b] - points[a])) if gap is None else gap
         if gap is not None:
             self._ask(self._wanted.gripped(jaws.grips(gap), jaws))
