@@ -172,4 +172,8 @@ def fold_of(model: Model, crease: str, angle: float) -> Fold:
     law = model.creases.get(crease)
     if law is None:
         return Fold(crease, by=angle)
+    if (
+        law.Lstar is None and law.stiffness is None
+    ):  # a law with a stiffness of its own, which `by` would impose
+        return Fold(crease, rest=math.pi - (-angle if model.mesh.folds.get(crease) == "valley" else angle))
     return Fold(crease, by=angle, Lstar=law.Lstar, stiffness=law.stiffness)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -20,11 +21,22 @@ class Grip:
 
     Attributes:
         to: (3,) the point that it is pulled to, mm.
-        stiffness: of the spring, N/mm.
+        stiffness: of the spring, N/mm, positive.
     """
 
     to: Vector
     stiffness: float
+
+    def __post_init__(self) -> None:
+        """Refuse a spring that cannot be, before the sheet is asked to bear it.
+
+        Raises:
+            ModelError: its stiffness is not positive and finite.
+        """
+        if not 0.0 < self.stiffness < math.inf:
+            raise ModelError(
+                f"a stiffness of {self.stiffness} of a grip cannot be; give a positive number of N/mm"
+            )
 
     def stiffened(self, stiffness: float, at: Array) -> Grip:
         """The same force by another spring.

@@ -21,7 +21,7 @@ class Mark:
     Attributes:
         controls: what was asked for.
         q: (n,) unknowns of the state at rest with that; None where it had not come to rest, or is too long ago.
-        left: it had snapped since it was flat.
+        left: as of `Session.left`.
         ways: that it had begun, as of `Session.straight`.
     """
 

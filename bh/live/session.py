@@ -68,7 +68,6 @@ class Session:
         self._past: list[Mark] = []
         self._undone: list[Mark] = []
         self._iterations = 0
-        self._stable: bool | None = True
         self._left = False
         self._ways = 0  # that it began behind the one on which it stands at first, and turns on them
         self._seen: tuple[Array, State] | None = None  # the newest state, and the unknowns that it belongs to
@@ -88,7 +87,10 @@ class Session:
 
     @property
     def left(self) -> bool:
-        """Whether it has snapped since it was flat, or lies on another branch (`leave`): a run may end elsewhere."""
+        """Whether it has snapped since the session began, or lies on another branch (`leave`): a run may end elsewhere.
+
+        A way back does not take that away, `undo` and `go_back` do.
+        """
         return self._left
 
     @property
@@ -119,6 +121,11 @@ class Session:
     def wanted(self) -> Controls:
         """What is asked for."""
         return self._wanted
+
+    @property
+    def controls(self) -> Controls:
+        """What the newest state is in equilibrium with: `wanted` at rest, else what it has come to."""
+        return self._now()
 
     @property
     def creases(self) -> tuple[str, ...]:
@@ -153,7 +160,7 @@ class Session:
             stiffness: of the spring, N/mm; None for one that suits the sheet.
 
         Raises:
-            ModelError: no such node, or no point.
+            ModelError: no such node, no point, or no stiffness.
         """
         if not 0 <= node < len(self.mesh.points):
             raise ModelError(
@@ -162,7 +169,7 @@ class Session:
         if len(to) != 3 or not all(math.isfinite(x) for x in to):
             raise ModelError(f"node {node} cannot be pulled to {to}; give three numbers of mm")
         old = self._wanted.grips.get(node)
-        given = stiffness or (old.stiffness if old else self._soft)
+        given = (old.stiffness if old else self._soft) if stiffness is None else stiffness
         x, y, z = (float(c) for c in to)
         self._ask(self._wanted.gripped({node: Grip((x, y, z), given)}))
 
@@ -178,7 +185,7 @@ class Session:
             stiffness: of the spring of each jaw, N/mm; None for one that suits the sheet.
 
         Raises:
-            ModelError: no such node, both at one point, or no gap.
+            ModelError: no such node, both at one point, no gap, or no stiffness.
         """
         if gap is not None and not (math.isfinite(gap) and gap >= 0.0):
             raise ModelError(
@@ -187,7 +194,7 @@ class Session:
         jaws = next((old for old in self._wanted.jaws if (old.a, old.b) == (a, b)), None)
         if jaws is None:
             points = self._state().points
-            jaws = Jaws.on(points, a, b, stiffness or JAWS * self._soft)
+            jaws = Jaws.on(points, a, b, JAWS * self._soft if stiffness is None else stiffness)
             gap = float(np.linalg.norm(points[b] - points[a])) if gap is None else gap
         if gap is not None:
             self._ask(self._wanted.gripped(jaws.grips(gap), jaws))
@@ -311,13 +318,15 @@ class Session:
 
         Returns:
             a model for `bh.trace`; where the sheet has `left` its branch on its way here, it may end on another one.
+            Panels pass through each other in it where they do so here, which a run would else look for.
         """
         folds = tuple(fold_of(self.model, name, angle) for name, angle in self._wanted.folds.items())
         pulls: tuple[Actuation, ...] = tuple(
             Pull(node, grip.to, grip.stiffness) for node, grip in self._wanted.grips.items()
         )
         steps = [Step(items) for items in (folds, pulls) if items]
-        return replace(self.model, steps=tuple(steps))
+        contact = self.model.contact if self.model.stops_itself else False
+        return replace(self.model, contact=contact, steps=tuple(steps))
 
     # ------------------------------------------------------------------------------- its own
 

@@ -61,9 +61,8 @@ def from_flat(session: Session, frame: Frame, going: Callable[[], bool]) -> From
     model = session.scene()
     if not model.steps:
         return FromFlat(True, "ends here: nothing acts")
-    run = Automatic(load=LoadControl(newton=_Heeding(going=going)))
     try:
-        path = trace(model, strategy=run, progress=_Heed(going), warn=False, neighbours=False)
+        path = trace(model, strategy=_run(going), progress=_Heed(going), warn=False, neighbours=False)
     except _EndedError:
         return None
     if not path.reached:
@@ -74,6 +73,39 @@ def from_flat(session: Session, frame: Frame, going: Callable[[], bool]) -> From
         return FromFlat(True, "ends here")
     ends = f"{there.energy.total:.4g} N mm there, {frame.state.energy.total:.4g} here, {off:.3g} mm apart"
     return FromFlat(False, f"ends on another branch: {ends}")
+
+
+def check(session: Session, frame: Frame, going: Callable[[], bool]) -> str:
+    """The same controls by a run from flat, on this mesh and on a coarser one.
+
+    Args:
+        session: the handling of the sheet; it is not changed.
+        frame: its state at rest.
+        going: asked at every iteration; False ends it.
+
+    Returns:
+        how far off the state is, in one line for the person.
+    """
+    model = session.scene()
+    if not any(step.actuations for step in model.steps):
+        return "there is nothing to check yet"
+    try:
+        path = trace(model, strategy=_run(going), progress=_Heed(going), estimate=True, warn=False)
+    except _EndedError:
+        return "the check was ended by what was asked next"
+    off = float(np.abs(path[-1].points - frame.points).max())
+    error = path.accuracy
+    estimate = (
+        f"its energy is off by about {100.0 * error.estimate:.2g} % on this mesh"
+        if error is not None and error.estimate is not None
+        else f"its error on this mesh is not known: {path.estimate_reason}"
+    )
+    return f"a run from flat ends as {path.outcome}, at most {off:.2g} mm from here; {estimate}"
+
+
+def _run(going: Callable[[], bool]) -> Automatic:
+    """The strategy of a run that nothing else was said of, which can be ended."""
+    return Automatic(load=LoadControl(newton=_Heeding(going=going)))
 
 
 class _EndedError(Exception):

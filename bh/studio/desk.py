@@ -19,10 +19,9 @@ from bh.live import Controls, Frame, Mark, Session, held
 from bh.live.holding import handled
 from bh.model.sheet import Sheet
 from bh.runtime.memory import give_back
-from bh.solving.trace import trace
-from bh.studio.branch import FromFlat, from_flat
+from bh.studio.branch import FromFlat, check, from_flat
 from bh.studio.colours import offered, top_of
-from bh.studio.exports import export, film, moving
+from bh.studio.exports import beside, export, film, moving
 from bh.studio.finer import Finer, finer
 from bh.studio.frames import Json, creases_of, described, line, packed, surface
 from bh.studio.pictures import Pictures
@@ -68,6 +67,9 @@ class Desk:
             sheet: to be handled.
             controls: as it was handled before; None for flat, or as it is drawn.
             there: where it lay when it was on the desk before; None for a new one.
+
+        Raises:
+            InputError: it cannot be handled; the desk is as before.
         """
         model = sheet.model if sheet.model.supports else held(sheet.model)
         session = Session(model, settles=sheet.settles)
@@ -75,21 +77,30 @@ class Desk:
             session.ask(controls)
         if there is not None:
             session.go_back(there)
+        frame = session.update(0.0)
+        colours = offered(frame.state)
+        # nothing is laid before all of it is known to be good
         self.sheet = sheet if model is sheet.model else replace(sheet, model=model)
-        self.session = session
-        self.frame = self.session.update(0.0)
+        self.session, self.frame, self._colours = session, frame, colours
         self._finer = None  # it is of another sheet
         give_back()
-        self._colours = offered(self.frame.state)
-        if self._colour != "none" and self._colour not in self._colours:
+        if self._colour != "none" and self._colour not in colours:
             self._colour = "bending"
         self._shown = ()
 
-    def take(self, message: asked.Asked) -> list[Json]:
+    def anew(self) -> None:
+        """Begin anew with the sheet, or where that breaks, too, with a pattern of the library."""
+        try:
+            self.put(self.sheet)
+        except Exception:  # whatever it was, the window goes on
+            self.put(of_library("arc"))
+
+    def take(self, message: asked.Asked, alone: Callable[[], bool] = lambda: True) -> list[Json]:
         """Do what a window asks.
 
         Args:
             message: checked.
+            alone: whether nothing else is asked yet, for which a check gives way.
 
         Returns:
             answers, beside the frames: a new sheet, a file, a line.
@@ -98,10 +109,11 @@ class Desk:
             InputError: it cannot be done; the desk is as before.
         """
         if isinstance(message, asked.Plain):
-            return self._plain(message.do)
+            return self._plain(message.do, alone)
         before, asked_before = self._was(), (self._now(), self.material)
         answers = [self.describe()] if self._laid(message) else self._done(message)
-        if (self._now(), self.material) != asked_before:
+        # a file is no stroke, though jaws may have moved while the sheet came to rest for it
+        if (self._now(), self.material) != asked_before and not isinstance(message, asked.Export):
             self._remember(message, before)
         return answers
 
@@ -138,12 +150,10 @@ class Desk:
                 self._paint(by)
             case asked.Export(what=what):
                 self.frame = self._rest()
-                if what in ("scene", "python"):
-                    ends = time.monotonic() + LONGEST_REST
-                    if self.from_flat(lambda: time.monotonic() < ends) is None and self.frame.at_rest:
-                        self.session.leave(self.frame.state)  # not known in time
+                if what in ("scene", "python") and not self._flat_known():
+                    self.session.leave(self.frame.state)
                 name, data = export(what, self.sheet, self.session, self.frame)
-                return [_file(name, data), *self._behind_a_snap(what, name)]
+                return [_file(name, data), *map(line, beside(what, name, self.session, self.frame))]
             case asked.Film(pictures=pictures, ms=ms, kind=kind):
                 name = f"{Path(self.sheet.name).stem or 'sheet'}.{kind}"
                 return [_file(name, film(pictures, ms) if kind == "gif" else moving(pictures, ms))]
@@ -170,9 +180,9 @@ class Desk:
                 return False
         return True
 
-    def _plain(self, what: str) -> list[Json]:
+    def _plain(self, what: str, alone: Callable[[], bool]) -> list[Json]:
         if what == "check":
-            return [self._check()]
+            return [line(check(self.session, self._rest(), alone))]
         now = self._was()
         if what == "flatten":
             flat = Controls(dict.fromkeys(self.session.creases, 0.0))
@@ -205,17 +215,13 @@ class Desk:
                 f"{what} {far:.3g} mm away, the sheet is {size:.3g} mm wide; stay within {FARTHEST:g} times that"
             )
 
-    def _behind_a_snap(self, what: str, name: str) -> list[Json]:
-        """What to know of a scene whose state a run from flat may miss."""
-        if what not in ("scene", "python") or not self.session.left:
-            return []
-        stem = Path(name).stem
-        how = (
-            f"`bh run {stem}.toml --resume` begins in the state that is saved with it"
-            if what == "scene"
-            else "the lines begin flat and may end elsewhere; the scene has the state"
-        )
-        return [line(f"{name} is saved; it was reached round a snap or by way of a snap: {how}")]
+    def _flat_known(self) -> bool:
+        """Whether it is known where a run from flat ends: not of a sheet on its way, or in time, or where it breaks."""
+        ends = time.monotonic() + LONGEST_REST
+        try:
+            return self.from_flat(lambda: time.monotonic() < ends) is not None
+        except Exception:  # the state is good, and is saved itself
+            return False
 
     def _paint(self, by: str) -> None:
         if by != "none" and by not in self._colours:
@@ -228,6 +234,8 @@ class Desk:
         if node >= len(mesh.points):
             raise InputError(f"there is no node {node} to hold; choose one of 0 to {len(mesh.points) - 1}")
         other = tuple(s for s in model.supports if getattr(s, "at", None) not in ([node], (node,)))
+        if not on and len(other) == len(model.supports):
+            raise InputError(f"node {node} is not held on its own; change its support in the scene")
         model = replace(model, supports=other)
         model = model.support([node], "xyz") if on else model
         self.put(replace(self.sheet, model=model), self.session.wanted)
@@ -235,7 +243,7 @@ class Desk:
     def _turn(self, sheet: LiveSheet) -> None:
         """The same handling of other kinds of creases; one that was flat goes as far as the others have gone."""
         wanted = self.session.wanted
-        parts = [angle / sheet.full[name] for name, angle in wanted.folds.items()]
+        parts = [angle / sheet.full[name] for name, angle in wanted.folds.items() if sheet.full[name]]
         gone = float(np.median(parts)) if parts else 0.0
         names = handled(sheet.model.mesh)
         folds = {name: wanted.folds.get(name, gone * sheet.full[name]) for name in names}
@@ -258,21 +266,6 @@ class Desk:
         frame = self.session.rest(LONGEST_REST)
         self._snapped = self._snapped or frame.snapped
         return frame
-
-    def _check(self) -> Json:
-        """The same state by a run from flat, on this mesh and on a coarser one: how far it is off."""
-        frame = self._rest()
-        if not any(step.actuations for step in self.session.scene().steps):
-            return line("there is nothing to check yet")
-        path = trace(self.session.scene(), estimate=True, warn=False)
-        off = float(np.abs(path[-1].points - frame.points).max())
-        error = path.accuracy
-        estimate = (
-            f"its energy is off by about {100.0 * error.estimate:.2g} % on this mesh"
-            if error is not None and error.estimate is not None
-            else f"its error on this mesh is not known: {path.estimate_reason}"
-        )
-        return line(f"a run from flat ends as {path.outcome}, at most {off:.2g} mm from here; {estimate}")
 
     # ------------------------------------------------------------------------------- what is shown
 
@@ -375,13 +368,14 @@ class Desk:
         frame = self.frame
         if not frame.at_rest:
             return None
-        if self._finer is None or self._finer[0] is not frame.state:
+        known = self._finer  # read once: another thread may put another sheet on the desk
+        if known is None or known[0] is not frame.state:
             found = finer(self.sheet.model, frame, going)
             give_back()  # the factors of its meshes: it may be long until the next wish
             if found is None:
                 return None
-            self._finer = frame.state, found
-        found = self._finer[1]
+            known = self._finer = frame.state, found
+        found = known[1]
         meets = len(self_contact(frame.state))
         head: Json = {
             "kind": "finer",
@@ -414,14 +408,15 @@ class Desk:
         frame, session = self.frame, self.session
         if not frame.at_rest:
             return None
-        if self._flat is None or self._flat[0] is not frame.state:
+        known = self._flat
+        if known is None or known[0] is not frame.state:
             found = from_flat(session, frame, going)
-            if found is None:
+            if found is None or not going():  # it may be of what was asked meanwhile
                 return None
-            self._flat = frame.state, found
+            known = self._flat = frame.state, found
             if not found.here:
                 session.leave(frame.state)
-        return self._flat[1]
+        return known[1]
 
     def describe(self) -> Json:
         """The sheet as a window draws it: flat, with its creases by name; what it had is gone."""

@@ -43,8 +43,8 @@ def export(what: str, sheet: LiveSheet, session: Session, frame: Frame) -> tuple
         frame: the newest state.
 
     Returns:
-        the name that the file should have, and its bytes. A scene of a drawing comes with it, as .zip; one that was
-        reached by way of a snap with the state, too.
+        the name that the file should have, and its bytes. A scene of a drawing comes with it, as .zip; one that a run
+        from flat may miss with the state, too.
 
     Raises:
         InputError: there is no such format, or the sheet has no scene.
@@ -73,6 +73,32 @@ def export(what: str, sheet: LiveSheet, session: Session, frame: Frame) -> tuple
         else:
             raise InputError(f"there is no format '{what}'; choose one of {', '.join(FORMATS)}")
         return f"{stem}-{kind}{dot}{suffix}", file.read_bytes()
+
+
+def beside(what: str, name: str, session: Session, frame: Frame) -> list[str]:
+    """What to know of a file that a run repeats: that the sheet is not where it is asked to be, or another branch.
+
+    Args:
+        what: one of `FORMATS`.
+        name: of the file.
+        session: the handling of the sheet.
+        frame: the newest state.
+
+    Returns:
+        one line; none where there is nothing to know.
+    """
+    if what not in ("scene", "python") or not (session.left or not frame.at_rest):
+        return []
+    stem = Path(name).stem
+    how = (
+        f"`bh run {stem}.toml --resume` begins in the state that is saved with it"
+        if what == "scene"
+        else "the lines begin flat and may end elsewhere; the scene has the state"
+    )
+    why = "a run from flat may end elsewhere, as by way of a snap"
+    if not frame.at_rest:
+        why = f"the sheet {f'cannot go on ({frame.note})' if frame.note else 'is on its way'}: it is saved as it lies"
+    return [f"{name} is saved; {why}: {how}"]
 
 
 def film(pictures: Sequence[str], ms: int) -> bytes:
@@ -142,7 +168,7 @@ def python_text(sheet: LiveSheet, session: Session) -> str:
         session: its handling.
     """
     stem = Path(sheet.name).stem or "sheet"
-    folds = ", ".join(f"{quoted(name)}: {angle!r}" for name, angle in session.wanted.folds.items())
+    folds = ", ".join(f"{quoted(name)}: {angle!r}" for name, angle in session.controls.folds.items())
     begin = (
         f'scene = bh.load_scene("{stem}.toml")  # exported beside this file\nmodel = scene.model\n'
         if sheet.tables
@@ -159,10 +185,10 @@ def python_text(sheet: LiveSheet, session: Session) -> str:
         )
     pulls = "".join(
         f"session.pull({node}, {grip.to!r}, {grip.stiffness!r})\n"
-        for node, grip in session.wanted.grips.items()
+        for node, grip in session.controls.grips.items()
     )
     said = (
-        " It was reached round a snap or by way of a snap: these lines may end elsewhere; the scene has the state."
+        " These lines begin flat and may end elsewhere, as by way of a snap; the scene has the state."
         * session.left
     )
     return (

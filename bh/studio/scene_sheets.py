@@ -74,17 +74,21 @@ def _table(name: str, value: object) -> str:
     """A table as TOML writes it."""
     if not isinstance(value, Mapping):
         raise InputError(f"'{name}' has to be a table")
-    return "\n".join([f"[{name}]", *(f"{_key(key)} = {_value(each)}" for key, each in value.items()), ""])
+    return "\n".join([f"[{name}]", *(f"{_key(key)} = {written(each)}" for key, each in value.items()), ""])
 
 
 def _key(name: str) -> str:
     return name if BARE.fullmatch(name) else json.dumps(name)
 
 
-def _value(value: object) -> str:
-    """A value as TOML writes it, tables in one line."""
+def written(value: object) -> str:
+    """A value as TOML writes it, tables in one line.
+
+    Args:
+        value: a table, a list, a text, a number, or true or false.
+    """
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {_value(each)}" for key, each in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(key)} = {written(each)}" for key, each in value.items()) + " }"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(each) for each in value) + "]"
+        return "[" + ", ".join(written(each) for each in value) + "]"
     return json.dumps(value)

@@ -1,4 +1,4 @@
-"""The scene of what is in the window, which `bh run` repeats: from flat, or from the state itself after a snap."""
+"""The scene of what is in the window, which `bh run` repeats: from flat, or from the state where that may miss it."""
 
 from __future__ import annotations
 
@@ -6,35 +6,40 @@ import json
 import math
 import re
 import tempfile
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 from bh.errors import InputError
 from bh.live import Session
-from bh.model.supports import Support
+from bh.live.controls import fold_of
+from bh.model.hinge_laws import LAWS, HingeLaw
+from bh.model.sheet import Sheet
+from bh.model.supports import RigidBody, Support
 from bh.paths.path import Path as Trace
 from bh.paths.record import Record, StepOutcome
 from bh.scene.load import parse_scene
 from bh.solvers.outcome import Outcome
+from bh.studio.scene_sheets import written
 from bh.studio.sheets import LiveSheet, quoted
 
 BALANCED = (
     1e-6  # of forces over the typical one of an element; a state with more is not saved as an equilibrium
 )
+NOTHING = ["force = { at = [0], each = [0.0, 0.0, 0.0] }"]  # of a step in which nothing acts
 SETTLING = re.compile(r'^strategy = "settling".*\n', re.MULTILINE)
 
 
 def scene_files(stem: str, sheet: LiveSheet, session: Session) -> dict[str, bytes]:
     """The scene and the files that it needs.
 
-    A sheet that has never snapped is where a run from flat along the branch ends. One that has may lie elsewhere: its
-    scene comes with the state as a path that was stopped after the first of two steps, from which
-    `bh run SCENE --resume` goes on; the second step holds everything where it is, and solves it anew.
+    A sheet that has kept to its branch is where a run from flat ends. Another one may lie elsewhere: its scene comes
+    with the state as a path that was stopped after the first of two steps, from which `bh run SCENE --resume` goes on;
+    the second step holds everything where it is, and solves it anew.
 
     Args:
         stem: name of the scene without its suffix.
         sheet: what was opened.
-        session: its handling, at rest.
+        session: its handling; of one that is not at rest the newest state is saved.
 
     Returns:
         bytes by name, the scene first.
@@ -54,7 +59,7 @@ def scene_files(stem: str, sheet: LiveSheet, session: Session) -> dict[str, byte
 def scene_text(sheet: LiveSheet, session: Session) -> str:
     """The scene that `bh run` repeats: the same mesh and supports, one step that folds and one that pulls.
 
-    After a snap both are one step, and the same once more, as `scene_files` says.
+    Where that may end elsewhere both are one step, and the same once more, as `scene_files` says.
 
     Args:
         sheet: what was opened.
@@ -71,7 +76,7 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
     lines = [f"# {sheet.name} as it stood in bh studio; mm, N, rad."]
     lines += (
         [
-            "# It was reached round a snap or by way of a snap: a run from flat may end elsewhere. It is kept beside:",
+            "# A run from flat may end elsewhere, as by way of a snap. The state is kept beside:",
             f"#     bh run {stem}.toml --resume",
             "# begins there, and its second step solves it anew. `bh run --force` begins flat.",
         ]
@@ -88,55 +93,83 @@ def scene_text(sheet: LiveSheet, session: Session) -> str:
     folds, pulls = _fold_lines(sheet, session), _pull_lines(session)
     if session.left:
         held = _pull_lines(session, still=True)
-        lines += ["[[steps]]", *folds, *pulls, "", "[[steps]]", *folds, *held, ""]
+        lines += ["[[steps]]", *(folds + pulls or NOTHING), "", "[[steps]]", *(folds + held or NOTHING), ""]
     else:
-        lines += ["[[steps]]", *folds, "", *(["[[steps]]", *pulls, ""] if pulls else [])]
+        for step in [each for each in (folds, pulls) if each] or [NOTHING]:
+            lines += ["[[steps]]", *step, ""]
     return "\n".join([*lines, "[outputs]", "pictures = true", ""])
 
 
 def _sheet_lines(session: Session) -> list[str]:
-    given = session.model.sheet
-    values = {item.name: getattr(given, item.name) for item in fields(given)}
-    return ["[sheet]", *(f"{key} = {value!r}" for key, value in values.items() if value is not None), ""]
+    values = _sheet_values(session.model.sheet)
+    return ["[sheet]", *(f"{key} = {written(value)}" for key, value in values.items()), ""]
+
+
+def _sheet_values(sheet: Sheet) -> dict[str, object]:
+    """Values by key; of a laminate its plies alone, which all of them come from."""
+    if sheet.plies is not None:
+        return {"plies": [_sheet_values(ply) for ply in sheet.plies]}
+    values = {item.name: getattr(sheet, item.name) for item in fields(sheet)}
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def _support_lines(session: Session) -> list[str]:
     lines = []
     for support in session.model.supports:
-        assert isinstance(support, Support)
+        if isinstance(support, RigidBody):
+            lines += ["[[supports]]", 'at = "rigid-body"', ""]
+            continue
+        if not isinstance(support, Support):
+            raise InputError(
+                f"{type(support).__name__} is a support of your own, which the window cannot write; take its scene"
+            )
         at = support.at if isinstance(support.at, str) else list(support.at)
         fix = (
             support.fix if isinstance(support.fix, str) else [list(map(float, axis)) for axis in support.fix]
         )
-        lines += ["[[supports]]", f"at = {json.dumps(at)}", f"fix = {json.dumps(fix)}", ""]
+        clamp = ["clamp = true"] if support.clamp else []
+        lines += ["[[supports]]", f"at = {json.dumps(at)}", f"fix = {json.dumps(fix)}", *clamp, ""]
     return lines
 
 
 def _stiffness(session: Session, crease: str) -> str:
-    """The key of a crease that is a spring; an empty string where its angle is imposed."""
+    """The key of a crease that is a spring; an empty string where its angle is imposed, or its law has a stiffness."""
     law = session.model.creases.get(crease)
-    if law is None:
+    if law is None or (law.Lstar is None and law.stiffness is None):
         return ""
     return f"Lstar = {law.Lstar!r}" if law.Lstar is not None else f"stiffness = {law.stiffness!r}"
 
 
 def _crease_lines(session: Session) -> list[str]:
     lines = []
-    for name in session.model.creases:
-        lines += [f"[creases.{quoted(name)}]", _stiffness(session, name), ""]
+    for name, law in session.model.creases.items():
+        lines += [f"[creases.{quoted(name)}]", _stiffness(session, name)]
+        lines += [f"rest = {law.rest!r}"] if law.rest != math.pi else []
+        lines += [f"law = {written(_law_values(name, law.law))}", ""] if law.law is not None else [""]
     return lines
 
 
+def _law_values(crease: str, law: HingeLaw) -> dict[str, object]:
+    """The table of a law that is no straight line."""
+    kind = next((kind for kind, known in LAWS.items() if type(law) is known), None)
+    if kind is None or not is_dataclass(law):
+        raise InputError(
+            f"the law of crease '{crease}' is one of your own, which the window cannot write; take the scene it is from"
+        )
+    return {"kind": kind, **{item.name: getattr(law, item.name) for item in fields(law)}}
+
+
 def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
-    rows, strips = [], session.mesh.wide_creases
-    for name, wanted in session.wanted.folds.items():
-        if name in strips:
-            rows.append(f"  {{ crease = {quoted(name)}, rest = {math.pi - wanted!r} }},")
+    rows = []
+    for name, angle in session.controls.folds.items():
+        rest = fold_of(session.model, name, angle).rest
+        if rest is not None:
+            rows.append(f"  {{ crease = {quoted(name)}, rest = {rest!r} }},")
             continue
-        angle = sheet.sense(name) * wanted + 0.0  # without -0.0
+        angle = sheet.sense(name) * angle + 0.0  # without -0.0
         spring = _stiffness(session, name)
         rows.append(f"  {{ crease = {quoted(name)}, by = {angle!r}{', ' if spring else ''}{spring} }},")
-    return ["fold = [", *rows, "]"]
+    return ["fold = [", *rows, "]"] if rows else []
 
 
 def _pull_lines(session: Session, still: bool = False) -> list[str]:
@@ -144,7 +177,7 @@ def _pull_lines(session: Session, still: bool = False) -> list[str]:
     rows = [
         f"  {{ node = {node}, to = {list(grip.to)}, stiffness = {grip.stiffness!r}"
         f"{f', start = {list(grip.to)}' if still else ''} }},"
-        for node, grip in session.wanted.grips.items()
+        for node, grip in session.controls.grips.items()
     ]
     return ["pull = [", *rows, "]"] if rows else []
 

@@ -8,7 +8,7 @@ import json
 import secrets
 import threading
 import time
-from collections.abc import Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -228,12 +228,13 @@ class Window(tornado.websocket.WebSocketHandler):
             task.add_done_callback(known.discard)
 
     async def _work(self) -> None:
-        run = asyncio.get_running_loop().run_in_executor
+        run, pool = asyncio.get_running_loop().run_in_executor, self.studio.pool
         try:
-            desk = self.desk = await run(self.studio.pool, self.studio.desk)
-        except InputError as error:
-            await self._say({"kind": "line", "text": str(error), "bad": True})
-            return
+            desk = await run(pool, self.studio.desk)
+        except Exception as error:
+            await self._say(_told(error, "another one is there"))
+            desk = await run(pool, Desk)
+        self.desk = desk
         await self._say(desk.describe())
         while True:
             try:
@@ -241,8 +242,8 @@ class Window(tornado.websocket.WebSocketHandler):
             except WebSocketClosedError:
                 raise
             except Exception as error:  # a sheet that breaks takes its session down, not the server
-                await self._say(_fault(error))
-                desk.put(desk.sheet)
+                await self._say(_told(error, "the sheet begins anew"))
+                await run(pool, desk.anew)
                 await self._say(desk.describe())
 
     async def _next(self, desk: Desk) -> None:
@@ -278,8 +279,11 @@ class Window(tornado.websocket.WebSocketHandler):
         waiting = []
         while not self.queue.empty():
             waiting.append(self.queue.get_nowait())
-        for message in newest(waiting):
-            await self._do(desk, message)
+        left = newest(waiting)
+        while left:
+            await self._do(
+                desk, left.pop(0), lambda: not left and self.queue.empty() and self.desk is not None
+            )
         self.taken += len(waiting)
 
     def _due(self, desk: Desk) -> bool:
@@ -315,9 +319,12 @@ class Window(tornado.websocket.WebSocketHandler):
         try:
             found = await run(self.studio.pool, desk.finer, going.is_set, heard)
         except Exception as error:
-            await self._say({"kind": "line", "text": f"no finer mesh ({type(error).__name__}: {error})"})
+            if going.is_set():
+                await self._say({"kind": "line", "text": f"no finer mesh ({type(error).__name__}: {error})"})
             return
-        if found is not None and going.is_set():
+        if not going.is_set():
+            return
+        if found is not None:
             await self.write_message(found, binary=True)
         try:
             flat = await run(self.studio.pool, desk.from_flat, going.is_set)
@@ -327,15 +334,13 @@ class Window(tornado.websocket.WebSocketHandler):
         if told is not None and going.is_set():
             await self._say(told)
 
-    async def _do(self, desk: Desk, message: str | bytes) -> None:
+    async def _do(self, desk: Desk, message: str | bytes, alone: Callable[[], bool]) -> None:
         """One message, answered; the last good state is kept where it cannot be done."""
         run = asyncio.get_running_loop().run_in_executor
         try:
-            answers = await run(self.studio.pool, lambda: desk.take(read(message)))
-        except InputError as error:
-            answers = [{"kind": "line", "text": str(error), "bad": True}]
+            answers = await run(self.studio.pool, lambda: desk.take(read(message), alone))
         except Exception as error:
-            answers = [_fault(error)]
+            answers = [_told(error, "the sheet stays as it was")]
         for answer in answers:
             await self._say(answer)
 
@@ -356,7 +361,7 @@ def allowed(request: tornado.httputil.HTTPServerRequest, token: str, wanted: str
 
 
 def newest(waiting: Sequence[str | bytes]) -> list[str | bytes]:
-    """Messages that are worth doing: of moves of the same slider or point only the last.
+    """Messages that are worth doing: of moves of the same slider or point with nothing else between only the last.
 
     Args:
         waiting: in the order in which they came.
@@ -364,8 +369,18 @@ def newest(waiting: Sequence[str | bytes]) -> list[str | bytes]:
     Returns:
         the others left out, in the same order.
     """
-    last = {_subject(message): number for number, message in enumerate(waiting)}
-    return [m for number, m in enumerate(waiting) if _subject(m) is None or last[_subject(m)] == number]
+    kept: list[str | bytes] = []
+    later: set[tuple[object, ...]] = set()  # what is moved again before anything else is asked
+    for message in reversed(waiting):
+        subject = _subject(message)
+        if subject is None:
+            later.clear()
+        elif subject in later:
+            continue
+        else:
+            later.add(subject)
+        kept.append(message)
+    return kept[::-1]
 
 
 def _subject(message: str | bytes) -> tuple[object, ...] | None:
@@ -379,9 +394,12 @@ def _subject(message: str | bytes) -> tuple[object, ...] | None:
     return str(data["do"]), *(repr(data.get(key)) for key in ("crease", "node", "a", "b"))
 
 
-def _fault(error: Exception) -> dict[str, object]:
-    text = f"a fault of the program ({type(error).__name__}: {error}); the sheet begins anew"
-    return {"kind": "line", "text": text, "bad": True}
+def _told(error: Exception, then: str) -> dict[str, object]:
+    """A line for what was refused, or for a fault of the program and what becomes of the sheet."""
+    text = str(error)
+    if not isinstance(error, InputError):
+        text = f"a fault of the program ({type(error).__name__}: {text}); {then}"
+    return {"kind": "line", "text": " ".join(text.split()), "bad": True}
 
 
 def open_window(

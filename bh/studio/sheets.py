@@ -306,12 +306,14 @@ def _strip_said(name: str) -> str:
 
 
 def _full(mesh: SheetMesh) -> dict[str, float]:
-    """Mean drawn fold angle of every crease, rad; half a turn where none is drawn."""
+    """Mean drawn fold angle of every crease, rad; half a turn where none is drawn, or the sheet is drawn flat."""
     found = {}
     for name in mesh.creases:
         drawn = np.abs(np.asarray(mesh.fold_angles.get(name, [math.nan])))
         known = drawn[~np.isnan(drawn)]
         found[name] = float(known.mean()) if len(known) else math.pi
+    if not any(found.values()):  # a file may give the angles of the flat sheet
+        found = dict.fromkeys(found, math.pi)
     return {**found, **dict.fromkeys(mesh.wide_creases, math.pi)}
 
 

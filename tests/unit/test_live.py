@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -287,6 +288,11 @@ def test_what_cannot_be_asked_is_named() -> None:
         (lambda: session.pull(10_000, (0.0, 0.0, 0.0)), "no node 10000"),
         (lambda: session.pull(0, (0.0, math.inf, 0.0)), "three numbers"),
         (lambda: session.pinch(0, 10_000), "no node 10000"),
+        *(
+            (partial(ask, stiffness=stiffness), f"a stiffness of {stiffness}")
+            for stiffness in (0.0, -1.0, math.inf, math.nan)
+            for ask in (partial(session.pull, 0, (0.0, 0.0, 5.0)), partial(session.pinch, 0, 9))
+        ),
         (lambda: session.pinch(3, 3), "lie at one point"),
         (lambda: session.pinch(0, 1, -1.0), "gap of -1"),
     )

@@ -15,6 +15,7 @@ import pytest
 
 import bh
 import meshes
+from bh.analysis.contact import self_contact
 from bh.commands.run import solve
 from bh.live import Session
 from bh.scene.load import load_scene
@@ -170,3 +171,31 @@ def test_nothing_is_told_of_a_sheet_on_its_way(asked: int) -> None:
     take(desk, do="percent", value=20.0)
     desk.work(0.0 if asked else 1e-9)
     assert desk.from_flat(lambda: True) is None
+
+
+def test_panels_that_pass_through_each_other_do_so_in_the_run_from_flat() -> None:
+    """As in the scene that is saved; a run that looks where they meet would end elsewhere, or not for long."""
+    roll = meshes.strip(20.0, 60.0, [15.0, 30.0, 45.0], folds=["mountain"] * 3)
+    desk = Desk(
+        of_model(bh.Model(meshes.structured(roll, along=8, rows=2), bh.Sheet(E=4000.0, nu=0.3, t=0.2)))
+    )
+    for percent in (70.0, 65.0):
+        take(desk, do="percent", value=percent)
+        desk.session.rest()
+    assert desk.session.model.contact == "auto"
+    assert desk.session.scene().contact is False
+    assert told(desk)["said"] == "ends here"
+    assert len(self_contact(desk.frame.state)) > 10
+
+
+@pytest.mark.parametrize("percent", [50.0, None])
+def test_a_run_that_was_ended_before_it_begins_says_nothing(percent: float | None) -> None:
+    """It would speak of what was asked since, and not of the state that is shown."""
+    desk = Desk(of_library("arc"))
+    take(desk, do="percent", value=30.0)
+    desk.frame = desk.session.rest()
+    if percent is None:
+        take(desk, do="undo")
+    else:
+        take(desk, do="percent", value=percent)
+    assert desk.from_flat(lambda: False) is None

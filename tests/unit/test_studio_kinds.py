@@ -165,3 +165,23 @@ def test_a_stroke_is_taken_back_at_once_and_other_changes_too() -> None:
     take(desk, do="flatten")
     take(desk, do="undo")
     assert now() == asked[2]
+
+
+@pytest.mark.parametrize(("angles", "half"), [((0, 0), (90.0, 90.0)), ((-90, 0), (45.0, 0.0))])
+def test_creases_that_a_file_draws_flat_can_be_folded_and_turned(
+    angles: tuple[float, float], half: tuple[float, float]
+) -> None:
+    """A file may give the angles of the flat sheet; where some are given, the others stay as they are drawn."""
+    across = [(0, 0), (10, 0), (20, 0), (30, 0), (30, 10), (20, 10), (10, 10), (0, 10)]
+    drawing = {
+        "vertices_coords": across,
+        "edges_vertices": [[k, (k + 1) % 8] for k in range(8)] + [[1, 6], [2, 5]],
+        "edges_assignment": ["B"] * 8 + ["M", "V"],
+        "edges_foldAngle": [0] * 8 + list(angles),
+        "faces_vertices": [[0, 1, 6, 7], [1, 2, 5, 6], [2, 3, 4, 5]],
+    }
+    desk = Desk(of_file("flat.fold", json.dumps(drawing).encode()))
+    take(desk, do="percent", value=50.0)
+    np.testing.assert_allclose(np.degrees(list(desk.session.wanted.folds.values())), half)
+    take(desk, do="crease", crease=desk.session.creases[0], kind="valley")
+    np.testing.assert_allclose(np.degrees(list(desk.session.wanted.folds.values())), half)

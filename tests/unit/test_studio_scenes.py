@@ -13,6 +13,7 @@ import pytest
 
 import bh
 import meshes
+from bh.commands.run import solve
 from bh.errors import InputError
 from bh.live import Frame, Session
 from bh.scene.load import load_scene
@@ -165,3 +166,140 @@ def test_a_refused_file_is_named_as_it_was_dropped(name: str) -> None:
         of_file(name, data)
     assert str(told.value).lstrip("'").startswith(name)
     assert "bh-studio-" not in str(told.value)
+
+
+def test_a_sheet_that_cannot_go_on_is_saved_where_it_lies(tmp_path: Path) -> None:
+    """Not where it is asked to be: its scene has the controls that it is in equilibrium with, and its state."""
+    desk = Desk()
+    take(desk, do="percent", value=30.0)
+    desk.session.update(0.0)
+    march = desk.session._under.march
+    march._increment = 0.2
+    while march.here.lam == 0.0:
+        desk.session.update(1e-9)
+    march.stuck = "no way on"
+    file, said = take(desk, do="export", what="scene")
+    assert "cannot go on (no way on): it is saved as it lies" in str(said["text"])
+    assert desk.frame.note
+    assert 0.0 < desk.frame.fold_angles()["crease"] < 0.29 * np.pi
+    (tmp_path / "arc.zip").write_bytes(base64.b64decode(str(file["data"])))
+    with ZipFile(tmp_path / "arc.zip") as archive:
+        archive.extractall(tmp_path)
+    scene = load_scene(tmp_path / "arc.toml")
+    resumed = solve(scene, tmp_path / "arc-out", resume=True, estimate=False, neighbours=False).path
+    for path in (resumed, bh.trace(scene.model)):
+        assert path.reached
+        np.testing.assert_allclose(path[-1].points, desk.frame.points, atol=1e-6)
+    lines, told = take(desk, do="export", what="python")
+    angle = desk.frame.controls.folds["crease"]
+    assert f'{{"crease": {angle!r}}}' in base64.b64decode(str(lines["data"])).decode()
+    assert "as it lies" in str(told["text"])
+
+
+@pytest.mark.parametrize(
+    "error", [InputError("no"), MemoryError(), RuntimeError("Factor is exactly singular")]
+)
+def test_a_run_from_flat_that_breaks_does_not_keep_a_state_from_being_saved(
+    monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    """It comes with its state, as one whose branch is not known in time."""
+
+    def breaks(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("bh.studio.desk.from_flat", breaks)
+    desk = Desk()
+    take(desk, do="percent", value=10.0)
+    settled(desk)
+    file, said = take(desk, do="export", what="scene")
+    assert file["name"] == "arc.zip"
+    assert "--resume" in str(said["text"])
+
+
+def test_a_file_is_nothing_to_take_back() -> None:
+    """Jaws that float move while the sheet comes to rest for it: that is no stroke, and redo is kept."""
+    desk = Desk()
+    take(desk, do="percent", value=30.0)
+    right = settled(desk).points[:, 0]
+    jaws = {"a": int(np.argmin(right)), "b": int(np.argmax(right))}
+    take(desk, do="pinch", **jaws)
+    settled(desk)
+    gap = desk.session.wanted.jaws[0].gap(desk.session.wanted.grips)
+    for part in (0.9, 0.8):
+        take(desk, do="pinch", **jaws, gap=part * gap)
+    take(desk, do="undo")
+    wanted, past = desk.session.wanted, len(desk._past)
+    take(desk, do="export", what="result")
+    assert desk.session.wanted != wanted
+    assert len(desk._past) == past
+    take(desk, do="redo")
+    assert desk.session.wanted.jaws[0].gap(desk.session.wanted.grips) == pytest.approx(0.8 * gap, rel=1e-9)
+
+
+E4000 = "E = 4000.0\nnu = 0.3\nt = 0.2\n"
+
+
+@pytest.mark.parametrize(
+    ("sheet", "more"),
+    [
+        (E4000, '[[supports]]\nat = "edge:inner"\nclamp = true'),
+        (E4000, '[[supports]]\nat = "rigid-body"'),
+        (E4000 + "expansion = [1e-5, 2e-5]", ""),
+        ("plies = [{ E = 4000.0, nu = 0.3, t = 0.1 }, { E = 2000.0, nu = 0.3, t = 0.1 }]", ""),
+        (E4000, '[creases.crease-1]\nLstar = 20\nrest = 2.9\nlaw = { kind = "softening", peak = 0.2 }'),
+        (
+            E4000,
+            "[creases.crease-1.law]\nkind = 'table'\nturns = [-1.0, 0.0, 1.0]\nmoments = [-0.1, 0.0, 0.3]",
+        ),
+    ],
+    ids=["clamp", "rigid-body", "expansion", "plies", "softening", "table"],
+)
+def test_a_scene_comes_out_with_all_that_its_sheet_is(sheet: str, more: str, tmp_path: Path) -> None:
+    """Supports, sheet and creases of every kind that a scene may give: a run ends in what is seen."""
+    head, rest = SCENE.split("[sheet]")
+    steps = rest[rest.index("[[steps]]") :].replace('rest = "2.1rad"', "by = 0.4")
+    first, second = (tmp_path / name for name in ("ring.toml", "saved.toml"))
+    first.write_text(f"{head}[sheet]\n{sheet}\n{more}\n{steps}")
+    desk = Desk(sheet_of(first, "card"))
+    take(desk, do="percent", value=20.0)
+    frame = settled(desk)
+    (answer,) = take(desk, do="export", what="scene")
+    second.write_bytes(base64.b64decode(str(answer["data"])))
+    springs = "law" in more
+    assert springs == (abs(frame.fold_angles()["crease-1"] - frame.wanted.folds["crease-1"]) > 1e-4)
+    saved = load_scene(second).model
+    assert saved.sheet == desk.session.model.sheet
+    assert dict(saved.creases) == dict(desk.session.model.creases)
+    path = bh.trace(saved, warn=False)
+    np.testing.assert_allclose(path[-1].points, frame.points, atol=1e-6)
+
+
+def test_a_node_that_is_held_with_others_is_told_as_such(tmp_path: Path) -> None:
+    """Its dot does nothing: that is a line, and the sheet stays."""
+    file = tmp_path / "ring.toml"
+    file.write_text(SCENE.replace("[creases.crease-1]", "[[supports]]\nat = [0, 1, 9]\n[creases.crease-1]"))
+    desk = Desk(sheet_of(file, "card"))
+    session = desk.session
+    for node in (1, 5):
+        with pytest.raises(InputError, match=f"node {node} is not held on its own"):
+            take(desk, do="hold", node=node, on=False)
+    assert desk.session is session
+    take(desk, do="hold", node=5, on=True)
+    take(desk, do="hold", node=5, on=False)
+    assert desk.session.model.supports == session.model.supports
+
+
+def test_the_scene_of_a_sheet_without_a_fold_is_run_too(tmp_path: Path) -> None:
+    """Its only crease is made flat: nothing acts, or a pull alone does."""
+    desk = Desk()
+    take(desk, do="crease", crease="crease", kind="flat")
+    saved = tmp_path / "arc.toml"
+    for pull in (False, True):
+        if pull:
+            take(desk, do="pull", node=0, to=[75.0, 0.0, 10.0])
+        frame = settled(desk)
+        (answer,) = take(desk, do="export", what="scene")
+        saved.write_bytes(base64.b64decode(str(answer["data"])))
+        path = bh.trace(load_scene(saved).model)
+        assert path.reached
+        np.testing.assert_allclose(path[-1].points, frame.points, atol=1e-6)
