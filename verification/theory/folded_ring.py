@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,13 +93,20 @@ def folded_ring(theta: float, released: float = 0.0) -> FoldedRing:
         theta: dihedral angle, rad in (0.9, 2.9).
         released: part of the bending across that is lost (`release`); 0 for isometric panels.
     """
+    unknown = _folded(theta)
+    for part in np.linspace(0.0, released, 4)[1:] if released else ():
+        unknown = _solved(theta, unknown, part)
+    return _read(theta, _solved(theta, unknown, released), released)
+
+
+@lru_cache(maxsize=16)
+def _folded(theta: float) -> Array:
+    """Mn and Mb at the crest of the isometric ring, by continuation from nearly flat."""
     at, unknown = START, _first(START)
     while at > theta:
         at = max(at - STEP, theta)
         unknown = _solved(at, unknown)
-    for part in np.linspace(0.0, released, 4)[1:] if released else ():
-        unknown = _solved(theta, unknown, part)
-    return _read(theta, _solved(theta, unknown, released), released)
+    return unknown
 
 
 def _solved(theta: float, guess: Array, released: float = 0.0) -> Array:
@@ -109,6 +116,7 @@ def _solved(theta: float, guess: Array, released: float = 0.0) -> Array:
     return np.asarray(found.x)
 
 
+@cache
 def _first(theta: float) -> Array:
     """Mn and Mb at the crest: the first pair on a grid of amplitudes from which the conditions can be met."""
     for mn in np.geomspace(0.05, 50.0, 25):
