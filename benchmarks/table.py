@@ -208,8 +208,8 @@ def machine() -> str:
 
 
 HEAD = (
-    "Written by `make bench-table`; do not edit. Every figure is of the run of that command that is told below: this "
-    "page is its record."
+    "Written by `make bench-table`; do not edit. Every figure is of the run of that command that is told below, but "
+    "for those of the two sections that tell of runs of their own: this page is the record."
 )
 TEXT = (Path(__file__).with_name("performance.txt")).read_text(encoding="utf-8")
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.polynomial import chebyshev
 
 pytest.importorskip("xarray")
 from xarray import Dataset
@@ -89,6 +90,21 @@ def test_sums_of_two_arguments() -> None:
     wanted = np.stack([np.exp(0.3 * i * x) * y for i in range(6)], axis=-1)
     np.testing.assert_allclose(Series.through(values)(x, y), wanted, atol=1e-6)
     assert Series.through(values)(np.asarray(0.1), np.asarray(0.2)).shape == (6,)
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 21])
+def test_sums_are_those_of_the_library(count: int) -> None:
+    """NumPy's Chebyshev sums at as many places as fill a block of the kernel, and more and fewer; constants, too."""
+    random = np.random.default_rng(count)
+    x, y = random.uniform(-1.0, 1.0, (2, count, 3))
+    for terms in (1, 2, 33):
+        one, two = random.standard_normal((terms, 6)), random.standard_normal((terms, terms, 6))
+        wanted = (
+            np.moveaxis(chebyshev.chebval(x, one), 0, -1),
+            np.moveaxis(chebyshev.chebval2d(x, y, two), 0, -1),
+        )
+        np.testing.assert_allclose(Series(one)(x), wanted[0], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(Series(two)(x, y), wanted[1], rtol=0.0, atol=1e-12)
 
 
 # --- the data set -------------------------------------------------------------------------------------------

@@ -17,6 +17,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from bh.applications.inverse.series_kernel import summed
+
 Array = NDArray[np.float64]
 
 
@@ -36,11 +38,7 @@ class Series:
 
     def __call__(self, *x: Array) -> Array:
         """(..., 6) values at one or two arguments (...) in [-1, 1]."""
-        each = [_vander(np.asarray(x_i), self.coefficients.shape[0] - 1) for x_i in x]
-        found = np.tensordot(each[0], self.coefficients, axes=(-1, 0))
-        if len(x) == 2:
-            found = np.einsum("...i,...ij->...j", each[1], found)
-        return np.asarray(found)
+        return summed(self.coefficients, *x)
 
     def __add__(self, other: Series) -> Series:
         """The sum of both, of any degrees."""
@@ -75,11 +73,6 @@ def lagrange(at: Array, x: float) -> Array:
         axis=1
     )
     return found
-
-
-def _vander(x: Array, degree: int) -> Array:
-    """(..., degree + 1) Chebyshev polynomials at arguments (...)."""
-    return np.asarray(chebyshev.chebvander(x, degree).reshape(*x.shape, degree + 1))
 
 
 def _matrix(count: int) -> Array:

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bh.applications.inverse.forward import Forward
-from bh.applications.inverse.segments import DesignError, folded
+from bh.applications.inverse.segments import DesignError
 from bh.applications.inverse.self_intersection import Projected, SelfIntersectionRule, allowed
-from bh.applications.inverse.transforms import chain, matrix
 from meshes.curves import arc_lengths, interpolated
 
 Array = NDArray[np.float64]
@@ -146,19 +145,20 @@ class FitCurve:
         return distance, np.zeros(len(x))
 
     def points(self, x: Array) -> Array:
-        """(N, samples, 2) points of the folded creases."""
+        """(N, samples, 2) points of folded creases: plane arcs, chords and turns of which add up."""
         theta, length = x[:, : self.n], np.maximum(x[:, self.n :], 1e-9)
-        k0 = theta / length * math.sin(0.5 * self.fold)
-        t, uvw = folded(k0, length, self.fold)
-        c, s = math.cos(self.heading), math.sin(self.heading)
-        ends, frames = chain(t, matrix(uvw), start=np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
-        knots = np.concatenate((np.zeros((len(x), 1)), np.cumsum(length, axis=1)), axis=1)
+        zero = np.zeros((len(x), 1))
+        turned = self.heading + np.concatenate((zero, np.cumsum(theta, axis=1)), axis=1)
+        knots = np.concatenate((zero, np.cumsum(length, axis=1)), axis=1)
+        chords = length * np.sinc(0.5 * theta / np.pi) * np.exp(1j * (turned[:, :-1] + 0.5 * theta))
+        ends = np.concatenate((zero, np.cumsum(chords, axis=1)), axis=1)
         at = np.linspace(0.0, 1.0, self.samples) * knots[:, -1:]
         which = np.minimum((at[:, :, None] >= knots[:, None, 1:]).sum(axis=-1), self.n - 1)
         row = np.arange(len(x))[:, None]
-        local, _ = folded(k0[row, which], at - knots[row, which], self.fold)
-        found: Array = ends[row, which, :2] + np.einsum("nsab,nsb->nsa", frames[row, which, :2, :], local)
-        return found
+        along = at - knots[row, which]
+        half = 0.5 * (theta / length)[row, which] * along
+        found = ends[row, which] + along * np.sinc(half / np.pi) * np.exp(1j * (turned[row, which] + half))
+        return np.stack((found.real, found.imag), axis=-1)
 
     def design(self, x: Array) -> Design:
         """The design of variables (2 n,)."""
