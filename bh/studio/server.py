@@ -336,13 +336,19 @@ class Window(tornado.websocket.WebSocketHandler):
 
     async def _do(self, desk: Desk, message: str | bytes, alone: Callable[[], bool]) -> None:
         """One message, answered; the last good state is kept where it cannot be done."""
-        run = asyncio.get_running_loop().run_in_executor
+        asked: list[str] = []
+
+        def work() -> list[dict[str, object]]:
+            wish = read(message)
+            asked.append(wish.do)
+            return desk.take(wish, alone)
+
         try:
-            answers = await run(self.studio.pool, lambda: desk.take(read(message), alone))
+            answers = await asyncio.get_running_loop().run_in_executor(self.studio.pool, work)
         except Exception as error:
             answers = [_told(error, "the sheet stays as it was")]
-        for answer in answers:
-            await self._say(answer)
+        for answer in answers:  # the page knows by it what has made its sheet, to ask for it again
+            await self._say({**answer, "of": asked[0] if asked else ""})
 
     async def _say(self, answer: dict[str, object]) -> None:
         await self.write_message(json.dumps(answer))

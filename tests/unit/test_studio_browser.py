@@ -359,3 +359,48 @@ def test_nobody_is_shut_out(chromium: Any, address: str, width: int, scheme: str
     assert [(item["id"], [node["html"][:90] for node in item["nodes"]]) for item in violations] == []
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
     seen.context.close()
+
+
+def test_where_a_run_from_flat_ends_is_told_of_what_is_seen_only(window: Visit) -> None:
+    """A word of it that comes behind the next wish is old."""
+    window.page.locator("#percent").fill("30")
+    window.rests("Object.values(head.asked)[0] > 0.5")
+    badges = window.page.evaluate(
+        """async () => {
+          const { branch } = await import("./static/finer.js"), { ask } = await import("./static/common.js");
+          const told = () => {
+            branch({ here: false, said: "elsewhere" });
+            return document.getElementById("badge").textContent;
+          };
+          const before = told();
+          ask({ do: "percent", value: 31 });
+          return [before, told()];
+        }"""
+    )
+    assert ["another branch" in badge for badge in badges] == [True, False]
+
+
+def test_a_drawing_that_was_refused_is_not_laid_again(chromium: Any, tmp_path: Path) -> None:
+    """Behind a network that drops lies what was seen before, in its material and not the file that was no drawing."""
+    first = Opened(of_library("strip"))
+    port = int(first.address.split(":")[2].split("/")[0])
+    seen = Visit(chromium, first.address)
+    seen.page.locator("#library").select_option("arc")
+    seen.page.wait_for_function("studio.sheet.name === 'arc'")
+    seen.page.locator("#t").fill("0.4")
+    seen.page.keyboard.press("Enter")
+    seen.page.wait_for_function("studio.sheet.material.t === 0.4")
+    (tmp_path / "bad.svg").write_text("no drawing at all")
+    seen.page.set_input_files("#file", tmp_path / "bad.svg")
+    seen.page.locator("#message", has_text="bad").wait_for()
+    seen.page.locator("#percent").fill("20")
+    seen.rests("Object.values(head.asked)[0] > 0.5")
+    first.close()
+    seen.page.locator("#message", has_text="is gone").wait_for()
+    again = Opened(of_library("strip"), port)
+    again._studio.token = first._studio.token  # so that the page finds it
+    seen.page.locator("#message", has_text="is back").wait_for()
+    seen.rests("Object.values(head.asked)[0] > 0.5")
+    assert seen.page.evaluate("[studio.sheet.name, studio.sheet.material.t]") == ["arc", 0.4]
+    again.close()
+    seen.context.close()

@@ -24,7 +24,11 @@ export function connect(answer, frame) {
   socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(query.get("token") ?? "")}`);
   socket.binaryType = "arraybuffer";
   socket.onopen = () => { wait = 500; asked = 0; tell(""); again(); };
-  socket.onmessage = ({ data }) => (typeof data === "string" ? answer(JSON.parse(data)) : frame(data));
+  socket.onmessage = ({ data }) => {
+    if (typeof data !== "string") { frame(data); return; }
+    const message = JSON.parse(data);
+    answered(message); answer(message);
+  };
   socket.onclose = () => {
     if (now.head) lost = now.head;
     $("badge").textContent = "not connected"; $("badge").classList.add("away-from");
@@ -33,19 +37,24 @@ export function connect(answer, frame) {
   };
 }
 // A server that comes back knows nothing of the sheet: it is laid again, and asked for what it was asked for last.
-let lost = null, laid = []; // the last frame before, and the messages that made the sheet
+let lost = null, laid = [], laying = []; // the last frame before; messages that made the sheet, and those not answered yet
 function again() {
   if (!lost) return;
-  const { asked: folds, grips } = lost, sheet = laid;
-  lost = null; laid = [];
+  const { asked: folds, grips } = lost, sheet = [...laid, ...laying];
+  lost = null; laid = []; laying = [];
   for (const message of sheet) ask(message);
   for (const [crease, angle] of Object.entries(folds)) ask({ do: "fold", crease, angle });
   for (const [node, to] of Object.entries(grips)) ask({ do: "pull", node: Number(node), to });
   tell("The connection to bh is back, and the sheet is folded again as it was asked for.");
 }
-function remembered(message) {
-  if (message.do === "open" || message.do === "pattern") laid = laid.filter((each) => each.do === "material");
-  if (["open", "pattern", "material", "spring", "hold", "crease", "contact"].includes(message.do)) laid.push(message);
+const LAYS = ["open", "pattern", "material", "spring", "hold", "crease", "contact"];
+// What was refused has made no sheet.
+function answered({ kind, of, bad }) {
+  if (!LAYS.includes(of) || !(kind === "sheet" || bad)) return;
+  const message = laying.shift();
+  if (!message || bad) return;
+  if (of === "open" || of === "pattern") laid = laid.filter((each) => each.do === "material");
+  laid.push(message);
 }
 // A stroke: from pointer to pointer, from key to key; what moves in it is taken back by one undo.
 let stroke = 1;
@@ -58,7 +67,7 @@ export function ask(message) {
   if (socket?.readyState !== WebSocket.OPEN) return;
   asked += 1;
   socket.send(JSON.stringify(MOVES.includes(message.do) ? { ...message, stroke } : message)); // at once: the rest can wait
-  remembered(message);
+  if (LAYS.includes(message.do)) laying.push(message);
   for (const done of after) done(message);
 }
 

@@ -48,7 +48,7 @@ export function finer(head, floats) {
 }
 
 export function branch(message) {
-  if (!now.head?.rest) return;
+  if (!now.head?.rest || now.head.heard !== asked) return;
   flat = message; badge();
   $("flat-run").textContent = message.said;
 }
