@@ -32,7 +32,8 @@ export function connect(answer, frame) {
   socket.onclose = () => {
     if (now.head) lost = now.head;
     $("badge").textContent = "not connected"; $("badge").classList.add("away-from");
-    tell("The connection to bh is gone; what you see is the last state. It is tried again.", true);
+    tell(now.head ? "The connection to bh is gone; what you see is the last state. It is tried again."
+      : "bh does not answer, or eight windows are open, which is the most: close one. It is tried again.", true);
     setTimeout(() => connect(answer, frame), wait); wait = Math.min(2 * wait, 8000);
   };
 }
