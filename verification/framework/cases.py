@@ -77,7 +77,7 @@ STUDIES = (
     Study("actuated", "solver", seconds=3),
     Study("real_sheets", "solver", seconds=3),
     Study("bifurcations", "solver", seconds=26),
-    Study("published", "solver", seconds=57),
+    Study("published", "solver", seconds=55),
     Study("cones", "solver", long=True),
     Study("peers", "solver", seconds=6),
     Study("tables4", "4", seconds=1),
@@ -101,7 +101,7 @@ STUDIES = (
     Study("problem_a", "6", seconds=25),
     Study("problem_b", "6", seconds=38),
     Study("problem_c", "6", long=True),
-    Study("two_models", "6", seconds=50),
+    Study("two_models", "6", seconds=36),
     Study("landing", "6", long=True),
     Study("tolerances", "6", long=True),
 )
