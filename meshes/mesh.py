@@ -226,6 +226,14 @@ class SheetMesh:
         sides = self.side_of
         return tuple(dict.fromkeys(sides.get(name, name) for name in self.creases))
 
+    def sense(self, crease: str) -> float:
+        """-1 of a crease that is drawn as a valley, else 1: times a fold angle, mountain positive.
+
+        Args:
+            crease: its name.
+        """
+        return -1.0 if self.folds.get(crease) == "valley" else 1.0
+
     def nodes(self, at: str) -> Ints:
         """Nodes of a place: "corner:inner-start", "edge:inner", "crease:NAME", "node:N", "near:X,Y" or "all".
 

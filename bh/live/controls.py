@@ -174,6 +174,6 @@ def fold_of(model: Model, crease: str, angle: float) -> Fold:
         return Fold(crease, by=angle)
     if (
         law.Lstar is None and law.stiffness is None
-    ):  # a law with a stiffness of its own, which `by` would impose
-        return Fold(crease, rest=math.pi - (-angle if model.mesh.folds.get(crease) == "valley" else angle))
+    ):  # its law has a stiffness of its own: `by` would impose the angle
+        return Fold(crease, rest=math.pi - model.mesh.sense(crease) * angle)
     return Fold(crease, by=angle, Lstar=law.Lstar, stiffness=law.stiffness)

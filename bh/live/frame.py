@@ -78,7 +78,5 @@ class Frame:
         """
         mesh = self.state.mesh
         return {
-            name: float(self.state.fold_angle(name).mean())
-            * (-1.0 if mesh.folds.get(name) == "valley" else 1.0)
-            for name in self.controls.folds
+            name: mesh.sense(name) * float(self.state.fold_angle(name).mean()) for name in self.controls.folds
         }

@@ -81,8 +81,4 @@ def drawn_folds(mesh: SheetMesh, names: list[str]) -> dict[str, float]:
     if drawn_flat(mesh):
         return dict.fromkeys(names, 0.0)
     angles = math.pi - dihedral_angles(mesh.points, mesh.topology.hinges)
-    return {
-        name: float(angles[crease_hinges(mesh, name)].mean())
-        * (-1.0 if mesh.folds.get(name) == "valley" else 1.0)
-        for name in names
-    }
+    return {name: mesh.sense(name) * float(angles[crease_hinges(mesh, name)].mean()) for name in names}

@@ -78,8 +78,7 @@ class LoadStepBuilder:
                 raise ModelError("fold of crease 'all': the sheet has no mountain or valley crease")
         hinges = [self._hinges(each) for each in names]
         sense = [
-            np.full(len(found), -1.0 if self.mesh.folds.get(each) == "valley" else 1.0)
-            for each, found in zip(names, hinges, strict=True)
+            np.full(len(found), self.mesh.sense(each)) for each, found in zip(names, hinges, strict=True)
         ]
         drawn = [
             np.asarray(self.mesh.fold_angles.get(each, np.full(len(found), np.nan)))

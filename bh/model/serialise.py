@@ -171,12 +171,24 @@ def _crease(crease: CreaseLaw) -> dict[str, object]:
     found = {
         key: value for key, value in vars(crease).items() if key != "law"
     }  # fingerprints as ever without one
-    return found if crease.law is None else {**found, "law": _tagged(crease.law, LAWS)}
+    return found if crease.law is None else {**found, "law": law_data(crease.law)}
 
 
 def _stored_crease(data: Mapping[str, Any]) -> CreaseLaw:
     law = data.get("law")
     return CreaseLaw(**{**data, "law": None if law is None else stored_law(law)})
+
+
+def law_data(law: HingeLaw) -> dict[str, object]:
+    """Plain data of a law, which `stored_law` makes it from again.
+
+    Args:
+        law: one of `LAWS`, or the user's own.
+
+    Returns:
+        its keys and a `kind`.
+    """
+    return _tagged(law, LAWS)
 
 
 def stored_law(data: Mapping[str, object]) -> HingeLaw:

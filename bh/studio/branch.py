@@ -87,7 +87,7 @@ def check(session: Session, frame: Frame, going: Callable[[], bool]) -> str:
         how far off the state is, in one line for the person.
     """
     model = session.scene()
-    if not any(step.actuations for step in model.steps):
+    if not model.steps:
         return "there is nothing to check yet"
     try:
         path = trace(model, strategy=_run(going), progress=_Heed(going), estimate=True, warn=False)

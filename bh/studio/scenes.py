@@ -6,13 +6,14 @@ import json
 import math
 import re
 import tempfile
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from pathlib import Path
 
 from bh.errors import InputError
 from bh.live import Session
 from bh.live.controls import fold_of
 from bh.model.hinge_laws import LAWS, HingeLaw
+from bh.model.serialise import law_data
 from bh.model.sheet import Sheet
 from bh.model.supports import RigidBody, Support
 from bh.paths.path import Path as Trace
@@ -151,12 +152,11 @@ def _crease_lines(session: Session) -> list[str]:
 
 def _law_values(crease: str, law: HingeLaw) -> dict[str, object]:
     """The table of a law that is no straight line."""
-    kind = next((kind for kind, known in LAWS.items() if type(law) is known), None)
-    if kind is None or not is_dataclass(law):
+    if type(law) not in LAWS.values():
         raise InputError(
             f"the law of crease '{crease}' is one of your own, which the window cannot write; take the scene it is from"
         )
-    return {"kind": kind, **{item.name: getattr(law, item.name) for item in fields(law)}}
+    return law_data(law)
 
 
 def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
