@@ -17,7 +17,7 @@ from skfem.refdom import RefTri
 
 from bh.model.ramp import Ramp
 from fem.sections import in_drawing
-from fem.shell import ShellElements
+from fem.shell import ShellElements, maps
 from fem.spaces import MOMENTS, STRAINS, barycentric
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ def at_rest(elements: ShellElements, growth: Ramp | None) -> AtRest | None:
 
 def _measures(elements: ShellElements, corners: Array) -> tuple[Array, Array]:
     table, mesh = elements.tables, elements.mesh
-    F = np.einsum("tnc,qnd->tqcd", mesh.planar[mesh.triangles], table.slopes)
+    F = maps(mesh, table.slopes)
     J = np.linalg.det(F)
     points = np.full((1, 2), 1.0 / 3.0) if mesh.degree == 1 else get_quadrature(RefTri, INSIDE[2])[0].T
     strain, curvature = np.einsum("qc,ktci->ktqi", barycentric(points), corners)

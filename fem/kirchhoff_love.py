@@ -29,7 +29,7 @@ from fem.shell import ShellElements, shell_elements
 from fem.state import ShellState
 from fem.system import ShellSystem
 from meshes import SheetMesh
-from meshes.curved import LinearMesh, lift
+from meshes.curved import LinearMesh, QuadraticMesh, lift
 
 Array = NDArray[np.float64]
 FREE = EdgeMoments()
@@ -64,8 +64,18 @@ class Shell:
             raise ModelError(
                 f"a step of the shell begins at a state of the shell, not at a {type(start).__name__}"
             )
-        elements = _elements(model.mesh, model.sheet, model.zones, self.degree)
-        return ShellSystem(model, load_step, start, elements, moments)
+        return ShellSystem(model, load_step, start, self.elements(model), moments)
+
+    def elements(self, model: Model) -> ShellElements:
+        """Elements of the sheet, the same for every step.
+
+        Args:
+            model: a flat sheet.
+
+        Raises:
+            MeshError: the sheet is not flat, or its mesh too coarse for its curves.
+        """
+        return _elements(model.mesh, model.sheet, model.zones, self.degree)
 
     def remarks(self, model: Model) -> tuple[Remark, ...]:
         """What to know of the mesh of a model: only whether curved edges have lost their curves."""
@@ -101,6 +111,40 @@ class LinearShell(Shell):
     refinement = None  # it is the consistent formulation, at a higher price
 
 
+class CurvedShell(Shell):
+    """A shell whose stress-free surface is not flat, for `follow`; a model of a scene cannot ask for it."""
+
+    name = "curved-shell"
+    refinement = None
+
+    def __init__(self, mesh: QuadraticMesh) -> None:
+        """Take the surface.
+
+        Args:
+            mesh: see `meshes.curved.lay_on`; a model of it has `mesh.sheet` for its mesh.
+        """
+        self.mesh = mesh
+
+    def elements(self, model: Model) -> ShellElements:
+        """Elements of the surface.
+
+        Args:
+            model: of the surface's own sheet, one isotropic material.
+
+        Raises:
+            ModelError: of another sheet, or of one with a grain or zones.
+        """
+        if model.mesh is not self.mesh.sheet:
+            raise ModelError(
+                "the model is of another mesh than the surface; build it with the surface's `sheet`"
+            )
+        if model.zones or model.sheet.directed:
+            raise ModelError(
+                "a curved stress-free surface has one isotropic material; leave grain and zones out"
+            )
+        return shell_elements(self.mesh, model.sheet)
+
+
 @lru_cache(maxsize=4)
 def _elements(mesh: SheetMesh, sheet: Sheet, zones: tuple[SheetZone, ...], degree: int) -> ShellElements:
     """Elements are those of the sheet, whatever the step."""
@@ -111,13 +155,15 @@ def follow(
     model: Model,
     moments: Sequence[EdgeMoments] = (),
     strategy: Strategy | None = None,
+    shell: Shell | None = None,
 ) -> tuple[list[ShellState], list[Increment]]:
-    """Follow a model whose boundary edges are loaded by couples, which `bh.trace` cannot be told.
+    """Follow a model with couples on its boundary edges or a curved surface, which `bh.trace` cannot be told.
 
     Args:
         model: a flat sheet with its supports and steps.
         moments: one a step, or none.
         strategy: what chooses increments; None for `bh.Automatic`.
+        shell: the formulation; None for `Shell`.
 
     Returns:
         The state at the beginning and after every accepted increment, and all increments. The last
@@ -127,13 +173,34 @@ def follow(
         ModelError: couples for other steps than the model has, or a model that a shell cannot take.
     """
     with one_blas_thread():
-        return _follow(model, moments, strategy or LoadControl())
+        return _follow(model, moments, strategy or LoadControl(), shell or Shell())
+
+
+def linear_response(model: Model, shell: Shell | None = None) -> tuple[Array, int]:
+    """Displacements of linear theory under the loads of a model's first step.
+
+    Args:
+        model: at rest before the step; the step only loads.
+        shell: the formulation; None for `Shell`.
+
+    Returns:
+        (n, 3) displacements of the corners, mm, and the number of unknowns.
+
+    Raises:
+        ModelError, MeshError: as `follow`.
+        IndefiniteError: the sheet can move freely.
+    """
+    with one_blas_thread():
+        system = (shell or Shell()).system(model, load_steps(model)[0], None)
+        q = system.start()
+        tangent = system.tangent(q, 0.0, system.evaluate(q, 0.0).forces)
+        dq = tangent.matrix.factorise().solve(-system.control_rate(q, 0.0))
+        return system.vectors(dq), len(q)
 
 
 def _follow(
-    model: Model, moments: Sequence[EdgeMoments], strategy: Strategy
+    model: Model, moments: Sequence[EdgeMoments], strategy: Strategy, shell: Shell
 ) -> tuple[list[ShellState], list[Increment]]:
-    shell = Shell()
     states: list[ShellState] = []
     increments: list[Increment] = []
     steps = load_steps(model)

@@ -15,7 +15,7 @@ from bh.model.zones import Sections
 from fem import grain
 from fem import sections as by_triangle
 from fem.here import Here
-from fem.shell import ShellElements
+from fem.shell import ShellElements, maps
 from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients
 from fem.state import ShellState
 from fem.system import ShellSystem
@@ -185,6 +185,8 @@ def stresses(
 ) -> tuple[Array, Array]:
     """Membrane forces and moments (t, 3) at the middle of each triangle, components xx, yy, xy of the flat sheet.
 
+    Of a surface that is not flat they are those along the axes of `fem.shell.maps`.
+
     Args:
         elements: of the sheet.
         made_of: what every triangle is made of.
@@ -194,14 +196,13 @@ def stresses(
     Returns:
         Membrane forces, N/mm, and moments, N.
     """
-    X = elements.mesh.planar[elements.mesh.triangles]
-    slopes = gradients(MIDDLE)[0] if elements.mesh.degree == 2 else SLOPES
-    F = np.einsum("tnc,nd->tcd", X, slopes)
+    slopes = gradients(MIDDLE) if elements.mesh.degree == 2 else SLOPES[None]
+    F = maps(elements.mesh, slopes)[:, 0]
     middle = elements.tables.middle
-    eps = np.einsum("tjm,m,jab->tab", strain.reshape(len(X), 3, -1), middle, STRAINS)
+    eps = np.einsum("tjm,m,jab->tab", strain.reshape(len(F), 3, -1), middle, STRAINS)
     inverse = np.linalg.inv(F)
     eps = np.einsum("tac,tab,tbd->tcd", inverse, eps, inverse)
-    m = np.einsum("tjm,m,jab->tab", moments.reshape(len(X), 3, -1), middle, MOMENTS)
+    m = np.einsum("tjm,m,jab->tab", moments.reshape(len(F), 3, -1), middle, MOMENTS)
     m = np.einsum("tca,tab,tdb->tcd", F, m, F) / np.linalg.det(F)[:, None, None] ** 2
     pick = ([0, 1, 0], [0, 1, 1])
     bent = m[:, pick[0], pick[1]]

@@ -20,7 +20,7 @@ three tensors, r rotations an edge (`fem.spaces.Tables`); n = 6, m = 3, r = 2 or
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,16 +39,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ShellElements:
-    """Elements of a flat sheet; t triangles, q points inside, p points on an edge.
+    """Elements of a sheet; t triangles, q points inside, p points on an edge.
 
     Attributes:
         membrane: (t, 3 m, 3 m) stiffness against generalised strains.
         bending: (t, 3 m, 3 m) stiffness against generalised curvatures.
-        strain0: (t, 3 m) strains that the metric of the flat sheet would have.
+        strain0: (t, 3 m) strains that the metric of the stress-free sheet would have.
         lengths: (e,) lengths of the (curved) edges, mm.
-        areas: (t,) of the flat triangles, mm^2.
+        areas: (t,) of the stress-free triangles, mm^2.
         edge_fit: (e, r, p) rotations of edges whose angles at the points of the edge come nearest to given ones.
         coupling: (t, 3 m, 3 m) energy strain . coupling . curvature of laminates, or None.
+        curvature0: (t, 3 m) curvatures of the stress-free sheet, 1/mm; None where it is flat.
     """
 
     mesh: ElementMesh
@@ -61,6 +62,7 @@ class ShellElements:
     areas: Array
     edge_fit: Array
     coupling: Array | None = None
+    curvature0: Array | None = None
 
     @property
     def moves(self) -> int:
@@ -82,7 +84,7 @@ class ShellElements:
         """
         strain, curvature = np.empty_like(self.strain0), np.empty_like(self.strain0)
         kernels.measures(x, gamma, self.loops, frames, strain, curvature)
-        return strain - self.strain0, curvature
+        return strain - self.strain0, curvature if self.curvature0 is None else curvature - self.curvature0
 
     def gradients(self, x: Array, frames: Frames) -> Array:
         """(t, 6 m, w) derivatives of strains and curvatures by positions and side rotations, w = `width`.
@@ -139,7 +141,7 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet, zones: tuple[SheetZone, ...]
     """Elements of a sheet; the mesh says of which degree.
 
     Args:
-        mesh: flat, of first or second order.
+        mesh: of the stress-free sheet, of first or second order.
         sheet: material and thickness.
         zones: parts of it that are made of something else.
 
@@ -147,8 +149,8 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet, zones: tuple[SheetZone, ...]
         ModelError: a zone that has no triangle, or two that share one.
     """
     table = tables(mesh.degree)
-    X = mesh.planar[mesh.triangles]
-    F = np.einsum("tnc,qnd->tqcd", X, table.slopes)
+    X = (mesh.planar if mesh.flat else mesh.nodes)[mesh.triangles]
+    F = maps(mesh, table.slopes)
     J = np.linalg.det(F)
     tangent = np.einsum("tnc,jpn->tjpc", X, table.along)
     speed = np.linalg.norm(tangent, axis=-1)
@@ -187,10 +189,31 @@ def shell_elements(mesh: ElementMesh, sheet: Sheet, zones: tuple[SheetZone, ...]
         _edge_fit(table, rim, edges, sides),
         coupling,
     )
-    frames = flat_frames(mesh)
-    strain0, _ = elements.measures(mesh.nodes, np.zeros((len(edges), 3, table.rotations)), frames)
-    elements.strain0[:] = strain0
-    return elements
+    flat = np.zeros((len(edges), 3, table.rotations))
+    strain0, curvature0 = elements.measures(mesh.nodes, flat, first_frames(mesh))
+    return replace(elements, strain0=strain0, curvature0=None if mesh.flat else curvature0)
+
+
+def maps(mesh: ElementMesh, slopes: Array) -> Array:
+    """(t, q, 2, 2) gradients of the maps from the reference triangle to the stress-free sheet, mm.
+
+    Args:
+        mesh: of the elements.
+        slopes: (q, n, 2) derivatives of the shapes at the points.
+
+    Returns:
+        In the axes of the drawing; of a surface that is not flat in those of its tangent plane at each point, the
+        first along the line that leads there from corner 0 toward corner 1.
+    """
+    if mesh.flat:
+        out: Array = np.einsum("tnc,qnd->tqcd", mesh.planar[mesh.triangles], slopes)
+        return out
+    g, h = np.einsum("tnc,qnd->dtqc", mesh.nodes[mesh.triangles], slopes)
+    first = unit(g)
+    along = (h * first).sum(axis=-1)
+    away = np.linalg.norm(h - along[..., None] * first, axis=-1)
+    rows = (np.linalg.norm(g, axis=-1), along), (np.zeros_like(away), away)
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _stiffness(table: Tables, F: Array, J: Array, made_of: Sections) -> tuple[Array, Array, Array | None]:
@@ -298,10 +321,20 @@ def unit(vectors: Array) -> Array:
     return out
 
 
-def flat_frames(mesh: ElementMesh) -> Frames:
-    """Frames of the flat sheet: its own normal."""
+def first_frames(mesh: ElementMesh) -> Frames:
+    """Frames of the stress-free sheet: its own normal; where it is not flat the mean of both sides'.
+
+    Which normal does not matter (the energy does not depend on the frames), but that none is far from its edges' own.
+    """
     t0 = unit(edge_tangents(mesh, mesh.nodes))
-    return Frames(t0, np.ascontiguousarray(np.broadcast_to(plane_axes(mesh.sheet)[2], t0.shape)))
+    if mesh.flat:
+        return Frames(t0, np.ascontiguousarray(np.broadcast_to(plane_axes(mesh.sheet)[2], t0.shape)))
+    table = tables(mesh.degree)
+    middle, xe = len(table.s) // 2, mesh.nodes[mesh.triangles]
+    tau, across = (np.einsum("jn,tnc->tjc", each[:, middle], xe) for each in (table.along, table.across))
+    normal = np.zeros((len(t0), 1, 3))
+    np.add.at(normal[:, 0], mesh.sheet.topology.triangle_edges, unit(np.cross(tau, across)))
+    return Frames(t0, unit(normal - (normal * t0).sum(axis=-1, keepdims=True) * t0))
 
 
 def carried_frames(mesh: ElementMesh, frames: Frames, x: Array, alpha: Array) -> Frames:
@@ -324,7 +357,7 @@ def carried_frames(mesh: ElementMesh, frames: Frames, x: Array, alpha: Array) ->
 
 
 def flat_stiffness(e: ShellElements, mesh: ElementMesh) -> tuple[float, float, float]:
-    """Of the flat sheet, from element stiffness that is never formed as a whole.
+    """Of the stress-free sheet, from element stiffness that is never formed as a whole.
 
     Args:
         e: its elements.
@@ -333,7 +366,7 @@ def flat_stiffness(e: ShellElements, mesh: ElementMesh) -> tuple[float, float, f
     Returns:
         a scale of energy, N mm, and the largest force, N, and moment on an edge, N mm, a mm of displacement of a node.
     """
-    B = e.gradients(mesh.nodes, flat_frames(mesh))
+    B = e.gradients(mesh.nodes, first_frames(mesh))
     count, moves = e.tables.measures, e.moves
     stretch, move, turn = B[:, :count, :moves], B[:, count:, :moves], B[:, count:, moves:]
     moments = e.bending @ turn

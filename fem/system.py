@@ -28,7 +28,7 @@ from fem.kernels import Frames
 from fem.loads import EdgeMoments
 from fem.outside import shell_outside
 from fem.rigid import describe_motion, free_rigid_motions, ground_stiffness, ground_triangle
-from fem.shell import ShellElements, carried_frames, edge_tangents, flat_frames, flat_stiffness, unit
+from fem.shell import ShellElements, carried_frames, edge_tangents, first_frames, flat_stiffness, unit
 from fem.state import ShellState
 from meshes.topology import Ints
 
@@ -74,7 +74,7 @@ class ShellSystem(StoppedShell, CreaseMemory):
         mesh = self.mesh = elements.mesh
         step = 0 if start is None else start.step + 1
         x = mesh.nodes if start is None else start.nodes
-        self.frames = flat_frames(mesh) if start is None else start.frames
+        self.frames = first_frames(mesh) if start is None else start.frames
         self.rest = at_rest(elements, load_step.growth)
         flat = np.zeros((len(model.mesh.topology.hinges), elements.tables.rotations))
         beta = flat if start is None else start.fold_angles

@@ -6,6 +6,7 @@ with straight edges along a curved crease their energy is 10-40 % wrong and conv
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -31,6 +32,7 @@ class LinearMesh:
     sheet: SheetMesh
 
     degree = 1
+    flat = True
 
     def __post_init__(self) -> None:
         """Refuse a sheet that is not flat."""
@@ -69,17 +71,19 @@ class LinearMesh:
 
 @dataclass(frozen=True, eq=False)
 class QuadraticMesh:
-    """A flat sheet of six-node triangles.
+    """A sheet of six-node triangles, flat unless `lay_on` made it.
 
     Attributes:
         sheet: the mesh of its corners.
         nodes: (n + e, 3) node positions, mm: the n points of the sheet, then one node on each edge of its topology.
         triangles: (t, 6) corners, then the middle nodes of the edges opposite corners 0, 1 and 2.
+        flat: whether the sheet lies in a plane.
     """
 
     sheet: SheetMesh
     nodes: Array
     triangles: Ints
+    flat: bool = True
 
     degree = 2
 
@@ -120,6 +124,7 @@ class QuadraticMesh:
 
 
 ElementMesh = LinearMesh | QuadraticMesh
+Surface = Callable[[Array], Array]  # (k, 2) points of a chart to (k, 3) points of a surface, mm
 
 
 def _planar(sheet: SheetMesh, nodes: Array) -> Array:
@@ -171,6 +176,26 @@ def lift(mesh: SheetMesh) -> QuadraticMesh:
     lifted = QuadraticMesh(mesh, np.vstack((mesh.points, middle)), _with_edges(mesh))
     _check_orientation(lifted)
     return lifted
+
+
+def lay_on(chart: SheetMesh, surface: Surface) -> QuadraticMesh:
+    """A surface that is not flat: every node of a lifted chart, the middles of its edges too, put where it is.
+
+    Args:
+        chart: a flat mesh; its lengths mean nothing, its named places are those of the surface.
+        surface: maps the chart to the surface, one to one; triangles that are counter-clockwise in the chart are so
+            from the side of the surface's normal.
+
+    Returns:
+        The mesh, with `sheet` the corners on the surface.
+
+    Raises:
+        MeshError: as `lift`, or triangles that the surface leaves no area.
+    """
+    lifted = lift(chart)
+    nodes = np.asarray(surface(lifted.planar), dtype=float)
+    sheet = replace(chart, points=nodes[: len(chart.points)], curves={}, spans=None, drawn=None)
+    return QuadraticMesh(sheet, nodes, lifted.triangles, flat=False)
 
 
 def edge_middles(mesh: SheetMesh) -> Array:

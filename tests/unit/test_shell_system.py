@@ -18,7 +18,7 @@ from fem import system as system_module
 from fem.assembly import build_pattern
 from fem.kirchhoff_love import LinearShell, Shell
 from fem.rigid import free_rigid_motions
-from fem.shell import carried_frames, flat_frames, shell_elements
+from fem.shell import carried_frames, first_frames, shell_elements
 from fem.state import ShellState
 from fem.system import ShellSystem
 from meshes import SheetMesh
@@ -115,7 +115,7 @@ def test_rigid_motion_stores_nothing(angle: float) -> None:
     elements = shell_elements(lift(distorted(SECTOR)), MYLAR)
     R = rotation(np.array([1.0, 2.0, 0.5]), angle)
     x = elements.mesh.nodes @ R.T + [3.0, -2.0, 5.0]
-    frames = flat_frames(elements.mesh)
+    frames = first_frames(elements.mesh)
     still = np.zeros((len(elements.areas), 3, 2))
     strain, curvature = elements.measures(x, still, frames)
     B = elements.gradients(x, frames)
@@ -153,7 +153,7 @@ def test_membrane_patch(sheet: Sheet) -> None:
     elements = shell_elements(lift(distorted(SECTOR)), sheet)
     A = np.array([[1.1, 0.05], [-0.1, 0.9], [0.3, 0.2]])
     x = elements.mesh.nodes[:, :2] @ A.T
-    strain, _ = elements.measures(x, np.zeros((len(elements.areas), 3, 2)), flat_frames(elements.mesh))
+    strain, _ = elements.measures(x, np.zeros((len(elements.areas), 3, 2)), first_frames(elements.mesh))
     green = 0.5 * (A.T @ A - np.eye(2))
     density = strain_energy_density(sheet, green)
     energy = 0.5 * np.einsum("tk,tkl,tl->t", strain, elements.membrane, strain)
@@ -184,7 +184,7 @@ def test_bending_patch(sheet: Sheet) -> None:
     alpha = np.einsum("ea,ab,ekb->ek", right, H, ends)
     gamma = alpha[elements.loops.edges] * elements.loops.sides[..., None]
     gamma = np.where(elements.loops.sides[..., None] > 0, gamma, gamma[..., ::-1])
-    _, curvature = elements.measures(x, gamma, flat_frames(elements.mesh))
+    _, curvature = elements.measures(x, gamma, first_frames(elements.mesh))
     energy = 0.5 * np.einsum("tk,tkl,tl->t", curvature, elements.bending, curvature)
     density = sheet.t**2 / 12.0 * strain_energy_density(sheet, H)
     np.testing.assert_allclose(energy, density * elements.areas, rtol=1e-6)
