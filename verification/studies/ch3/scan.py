@@ -267,12 +267,11 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
     for mesh, length in (("gmsh", size), ("one row", None)):
         tried = []
         for Lstar in Lstars:
-            known = length == size and Lstar == PAPER_LSTAR
+            known = (length, Lstar) == (size, PAPER_LSTAR)
             path = same if known else folded(sample.pattern, "bars-and-hinges", Lstar, length)
             if not path.reached:
                 continue
-            if length is None and Lstar == PAPER_LSTAR:
-                _one_row(result, name, paper[-1], path[-1])
+            _one_row(result, name, Lstar, length, (paper[-1], path[-1]))
             try:
                 tried.append((_against(cloud, paper[-1], path[-1]), Lstar))
             except InputError as lost:  # this stiffness has no place beside the others, and says so
@@ -291,8 +290,7 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
         (there, moved, surface), Lstar = min(tried, key=lambda one: one[0][0].mean)
         back = scan.distances(moved, surface, "sheet-to-cloud")
         params = {"pattern": name, "mesh": mesh, "formulation": "bars-and-hinges", "Lstar_mm": Lstar}
-        # one row a panel lets bars and hinges bend along its node lines only, which soft springs cannot force: it needs
-        # its own L*, and quick runs try one only
+        # one row a panel bends along its node lines only, and needs an L* of its own: quick runs try one
         judged = sample.claim if mesh == "gmsh" or not context.quick else None
         result.check(
             "pattern: lowest mean distance over L*",
@@ -347,11 +345,16 @@ def _against(cloud: Array, paper: bh.State, state: bh.State) -> tuple[scan.Dista
     return scan.distances(moved[: max(len(cloud) // 10, 4000)], surface), moved, surface
 
 
-def _one_row(result: CaseResult, name: str, paper: bh.State, state: bh.State) -> None:
-    """How far a sheet of one row of bars and hinges a panel folds, in the mean of all creases."""
+def _one_row(
+    result: CaseResult, name: str, Lstar: float, size: float | None, states: tuple[bh.State, bh.State]
+) -> None:
+    """How far a sheet of one row of bars and hinges a panel folds with the paper's L*, in the mean of all creases."""
+    if size is not None or Lstar != PAPER_LSTAR:
+        return
+    paper, one_row = states
     angles = [
         math.degrees(float(np.mean([np.abs(each.fold_angle(crease)).mean() for crease in each.mesh.creases])))
-        for each in (state, paper)
+        for each in (one_row, paper)
     ]
     result.check(
         "pattern: mean fold angle of all creases, one row of bars and hinges",
