@@ -230,7 +230,7 @@ def _trouble(row: Row) -> str:
     if not row.balances:
         off = abs(row.work / row.gained - 1.0) if row.gained else math.inf
         words.append(
-            f"work {row.work:.5g}, energy gained {row.gained:.5g} N mm: {off:.3%} apart where {row.allowed:.3%} is allowed"
+            f"work {row.work:.5g}, energy gained {row.gained:.5g} N mm: {off:.3%} apart, {row.allowed:.3%} allowed"
         )
     return "; ".join(words)
 
