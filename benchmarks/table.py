@@ -233,7 +233,7 @@ def machine() -> str:
 
 HEAD = (
     "Written by `make bench-table`; do not edit. Every figure is of the run of that command that is told below, and "
-    "leads to its record, but for those of the two sections that tell of runs of their own."
+    "leads to its record, but for the last section, which tells of a run of its own."
 )
 TEXT = (Path(__file__).with_name("performance.txt")).read_text(encoding="utf-8")
 
