@@ -26,7 +26,7 @@ Params = Mapping[str, str | float | bool]
 
 
 class Measured:
-    """What a benchmark has measured until now, and the load of the machine when it began."""
+    """What a benchmark has measured until now, and the commit, date and load of the machine when it began."""
 
     def __init__(self, name: str, title: str, words: Sequence[str] | None = None) -> None:
         """Nothing is measured yet.
@@ -39,7 +39,8 @@ class Measured:
         typed = shlex.join(sys.argv[1:] if words is None else words)
         command = f"python -m benchmarks.{name} {typed}".strip()
         self.result = CaseResult(f"bench_{name}", title, "How long does it take?", f"measured by `{command}`")
-        self.load = round(os.getloadavg()[0], 2)
+        self.run_by = conditions(quick=False, jobs=1)  # now: records that are written later change the commit
+        self.run_by["machine"] |= {"model": processor(), "load at the start": round(os.getloadavg()[0], 2)}
         self.began = time.perf_counter()
 
     def add(self, quantity: str, value: float, unit: str, params: Params, cost: Cost | None = None) -> None:
@@ -66,10 +67,8 @@ class Measured:
 
     def data(self) -> dict[str, Any]:
         """The record, with versions, date and machine."""
-        run_by = conditions(quick=False, jobs=1)
-        run_by["machine"] |= {"model": processor(), "load at the start": self.load}
         self.result.wall_time_s = time.perf_counter() - self.began
-        return record([self.result], run_by)
+        return record([self.result], self.run_by)
 
     def write(self, file: Path | None) -> None:
         """Write the record, and say where; nothing without a file.
