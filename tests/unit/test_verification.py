@@ -50,6 +50,7 @@ SLOW = {
     "drawings",
     "landing",
     "tolerances",
+    "designs",
     "bend_twist",
     "cones",
     "agreement",
