@@ -9,10 +9,11 @@ from collections.abc import Callable
 
 from verification.framework.checks import CaseResult, Context
 from verification.studies.solver.page_figures.calibration import calibration
+from verification.studies.solver.page_figures.contact import touches
 from verification.studies.solver.page_figures.drawing import drawings
 from verification.studies.solver.page_figures.materials import grains, stresses, wide_creases
 from verification.studies.solver.page_figures.pinching import pinches
-from verification.studies.solver.page_figures.strips import membranes, responses, sectors
+from verification.studies.solver.page_figures.strips import membranes, pressures, responses, sectors
 
 STUDIES: dict[str, Callable[[CaseResult, bool], None]] = {
     "strips bent in their plane": membranes,
@@ -21,6 +22,8 @@ STUDIES: dict[str, Callable[[CaseResult, bool], None]] = {
     "stresses of a bent strip": stresses,
     "wide creases": wide_creases,
     "stiffness, buckling and response": responses,
+    "pressure at a free edge": pressures,
+    "moulds and a crushed corrugation": touches,
     "calibration": calibration,
     "pinches": pinches,
     "drawings": drawings,

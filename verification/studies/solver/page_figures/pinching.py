@@ -8,8 +8,11 @@ import bh
 import meshes
 from bh.applications.pinching import PATTERNS, respond
 from verification.framework.checks import CaseResult, reached_energy
+from verification.studies.ch5.pinch_shell import SHELL
+from verification.studies.ch5.pinching import pinched
 
 LEFT, ZONE, COUPLE = math.pi / 14.0, 20.0, 150.0  # rad, mm, N mm / mm
+KAPPA = 0.01  # 1 / mm
 GRIPPED = ((50, 1), (100, 2), (200, 4), (400, 8))  # cells
 LOOSE = (("consistent", 1), ("consistent", 2), ("bars-and-hinges", 1))
 STOCK = ((0.5, 2.0), (0.1, 0.5))  # t and L* of the source, mm
@@ -25,9 +28,7 @@ def pinches(result: CaseResult, quick: bool) -> None:
     for along, rows in GRIPPED[: 1 if quick else 4]:
         model = folded("consistent", along, rows, 0.5, 2.0)
         path = bh.trace(
-            model.pinch(
-                "crease", at=0.5, to=LEFT, length=ZONE, how="couple", couple=COUPLE, profile="grip"
-            ),
+            model.pinch("crease", at=0.5, to=LEFT, length=ZONE, how="couple", couple=COUPLE, profile="grip"),
             estimate=False,
             neighbours=False,
         )
@@ -38,6 +39,7 @@ def pinches(result: CaseResult, quick: bool) -> None:
             params={"along": along, "rows": rows},
             path=path,
         )
+    _curvature(result, quick)
     for formulation, rows in LOOSE:
         for t, Lstar in STOCK:
             model = folded(formulation, 100 * rows, rows, t, Lstar)
@@ -60,6 +62,18 @@ def pinches(result: CaseResult, quick: bool) -> None:
                 params={"pattern": name},
                 path=found.path,
             )
+
+
+def _curvature(result: CaseResult, quick: bool) -> None:
+    found = pinched(SHELL, (50, 1) if quick else (100, 2), KAPPA)
+    inside = found.inside(found.crease.curvature)
+    result.check(
+        "largest curvature of a pinched crease over kappa_0",
+        float(inside.max()) / KAPPA,
+        source="closed to pi / 14 by a raised cosine of 20 mm",
+        params={"formulation": "shell", "kappa_0_per_mm": KAPPA},
+        path=found.path,
+    )
 
 
 def folded(formulation: str, along: int, rows: int, t: float, Lstar: float) -> bh.Model:

@@ -87,6 +87,23 @@ def sectors(result: CaseResult, quick: bool) -> None:
         )
 
 
+def pressures(result: CaseResult, quick: bool) -> None:
+    """Iterations that a cantilever takes which a pressure on its free edges blows round.
+
+    Args:
+        result: gets the checks.
+        quick: the smallest pressure alone.
+    """
+    sheet, long = bh.Sheet(E=4000.0, nu=0.0, t=0.2), 60.0
+    mesh = meshes.structured(meshes.strip(long, 6.0, [3.0], "flat"), kind="alternating", along=20, rows=1)
+    held = bh.Model(mesh, sheet).support("edge:start", "xyz", clamp=True)
+    for load in (2.0,) if quick else (2.0, 10.0, 20.0):
+        pressure = bh.Pressure(load * sheet.bending_stiffness() / long**3)
+        path = bh.trace(held.step(pressure), estimate=False, neighbours=False).require()
+        params = {"p L^3 / D": load}
+        result.check("iterations of a blown cantilever", path.iterations, params=params, path=path)
+
+
 def responses(result: CaseResult, quick: bool) -> None:
     """Stiffness at a corner, hinged and clamped; the buckling loads of the example; the strip that sways.
 
@@ -108,7 +125,9 @@ def responses(result: CaseResult, quick: bool) -> None:
             source="Euler's column",
             params={"number": number},
         )
-    found = response(arch(6 if quick else 24, 1 if quick else 4), "near:30,5", (0.0, 0.0, 1.0), -8.0, points=16)
+    found = response(
+        arch(6 if quick else 24, 1 if quick else 4), "near:30,5", (0.0, 0.0, 1.0), -8.0, points=16
+    )
     for peak in found.peaks[:1]:
         result.check("force at which a pressed arch sways", abs(peak.force), unit="N")
         result.check("way at which a pressed arch sways", abs(peak.displacement), unit="mm")
