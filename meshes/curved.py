@@ -190,10 +190,12 @@ def lay_on(chart: SheetMesh, surface: Surface) -> QuadraticMesh:
         The mesh, with `sheet` the corners on the surface.
 
     Raises:
-        MeshError: as `lift`, or triangles that the surface leaves no area.
+        MeshError: as `lift`, a surface that gives no points in space, or leaves triangles no area.
     """
     lifted = lift(chart)
     nodes = np.asarray(surface(lifted.planar), dtype=float)
+    if nodes.shape != lifted.nodes.shape or not np.isfinite(nodes).all():
+        raise MeshError("a surface has to map (k, 2) points of its chart to (k, 3) finite points, mm")
     sheet = replace(chart, points=nodes[: len(chart.points)], curves={}, spans=None, drawn=None)
     return QuadraticMesh(sheet, nodes, lifted.triangles, flat=False)
 

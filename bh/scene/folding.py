@@ -18,6 +18,7 @@ import numpy as np
 from bh.errors import InputError
 from bh.materials.table import MATERIALS as STOCK
 from bh.scene.foldable import Found, understood
+from bh.scene.toml_text import written
 from meshes import CreasePattern, MeshError, SheetMesh
 from meshes.cells import RuledCells
 from meshes.choices import choices, cut, panel_width
@@ -181,8 +182,8 @@ def _proposed(
             ),
             *([mesh, ""] if mesh.startswith("accuracy") else []),
             "[pattern]",
-            f"file = {_quoted(file.name)}",
-            *(f"{key} = {_toml(value)}" for key, value in options.items()),
+            f"file = {written(file.name)}",
+            *(f"{key} = {written(value)}" for key, value in options.items()),
             *(
                 [f"tolerance = {_tolerance(found):.3g}"]
                 if "drawn" in mesh and file.suffix.lower() != ".fold"
@@ -208,7 +209,7 @@ def _proposed(
             "",
             "[outputs]",
             "pictures = true",
-            *([f"folded = [{', '.join(_quoted(each) for each in wish.write)}]"] if wish.write else []),
+            *([f"folded = {written(wish.write)}"] if wish.write else []),
             "",
         ]
         scenes.append(Proposal("\n".join(lines), in_words, (*assumed, words)))
@@ -334,13 +335,3 @@ def _narrowest(found: Found, width: float) -> float:
 def _tolerance(found: Found) -> float:
     sheet = found.faces.points if found.faces is not None else found.pattern.rings[0]  # type: ignore[union-attr]
     return COARSE * float(np.linalg.norm(np.ptp(sheet, axis=0)))
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "/").replace('"', '\\"') + '"'
-
-
-def _toml(value: object) -> str:
-    return (
-        _quoted(value) if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(value)
-    )

@@ -1,10 +1,15 @@
-"""TOML texts, counted before they are parsed: the parser is written in Python, and a text may be made to be slow."""
+"""TOML texts: counted before they are parsed (a text may be made to be slow), and values as they are written.
+
+Values stand in the middle of lines with comments of their own, which a writer of whole documents would not keep.
+"""
 
 from __future__ import annotations
 
+import json
 import re
 import stat
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 
 from bh.errors import SceneError
@@ -13,6 +18,7 @@ from meshes.limits import check_limit, limits
 BYTES_EACH = 40  # of an entry: files are 4 MB long at most, since a number of 10 MB takes 1.4 GB to parse
 MOST_PARTS = 16  # of a dotted key: the time of tomllib grows with their square
 COUNTED = "this file (lines, keys and values of lists)"
+BARE = re.compile(r"[A-Za-z0-9_-]+")  # keys that need no quotes
 # a part of a key and the dot behind it, over and over; possessive, and not from within a word: linear in the text
 _DOTTED = re.compile(r"""(?:(?:(?<![\w-])[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)++""", re.ASCII)
 
@@ -84,3 +90,32 @@ def waits(place: Path) -> bool:
     except (OSError, ValueError):  # told where it is opened
         return False
     return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
+
+
+def key_of(name: str) -> str:
+    """A name as TOML writes it for a key, in quotes where it needs them.
+
+    Args:
+        name: of any characters.
+    """
+    return name if BARE.fullmatch(name) else _quoted(name)
+
+
+def written(value: object) -> str:
+    """A value as TOML writes it, tables in one line and numbers with all their digits.
+
+    Args:
+        value: a table, a list, a text, a number, or true or false.
+    """
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key_of(key)} = {written(each)}" for key, each in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(written(each) for each in value) + "]"
+    if isinstance(value, str):
+        return _quoted(value)
+    return repr(float(value)) if isinstance(value, float) else json.dumps(value)
+
+
+def _quoted(text: str) -> str:
+    """As in JSON, but that characters are not written as pairs of halves, and that DEL is."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

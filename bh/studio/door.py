@@ -19,6 +19,7 @@ from bh.errors import InputError
 
 HOST = "127.0.0.1"
 QUEUE = 128  # connections
+LAST_PORT = 65535
 PATIENCE = 3.0  # s that a browser has to ask, before the program ends without a window
 LONGEST = 65_536  # bytes of a request that is not served
 
@@ -44,10 +45,12 @@ class Door:
             token: None for a new one.
 
         Raises:
-            InputError: the port is taken.
+            InputError: the port is taken, or there is none such.
         """
         from tornado.netutil import bind_sockets
 
+        if not 0 <= port <= LAST_PORT:  # the system would take what is left of it after a division
+            raise InputError(f"there is no port {port}; take one of 0 to {LAST_PORT}, 0 for a free one")
         try:
             sockets = bind_sockets(port, address=HOST, backlog=QUEUE)
         except OSError as error:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from bh.errors import InputError
 from bh.scene.load import parse_scene
-from bh.scene.toml_text import read_toml, toml_bytes
+from bh.scene.toml_text import key_of, read_toml, toml_bytes, written
 from bh.studio.sheets import LONGEST, MOST_TRIANGLES, LiveSheet, live
 
 SCENE = ".toml"
-BARE = re.compile(r"[A-Za-z0-9_-]+")  # keys that need no quotes
 # tables that say what the sheet is; the window writes sheet and supports itself
 KEPT = ("pattern", "mesh", "model")
 OTHERS = ("sheet", "supports", "creases", "steps", "outputs", "contact", "symmetry", "accuracy")
@@ -58,7 +55,7 @@ def of_scene(file: Path) -> LiveSheet:
     creases = data.get("creases")
     for crease, table in creases.items() if isinstance(creases, Mapping) else ():
         if isinstance(table, Mapping) and "width" in table:
-            tables.append(_table(f"creases.{_key(crease)}", table))
+            tables.append(_table(f"creases.{key_of(crease)}", table))
     said = ("the steps of the scene are left out: the window folds it",)
     sheet = live(file.stem, scene, "\n".join(tables), said)
     if drawing is None:
@@ -74,21 +71,4 @@ def _table(name: str, value: object) -> str:
     """A table as TOML writes it."""
     if not isinstance(value, Mapping):
         raise InputError(f"'{name}' has to be a table")
-    return "\n".join([f"[{name}]", *(f"{_key(key)} = {written(each)}" for key, each in value.items()), ""])
-
-
-def _key(name: str) -> str:
-    return name if BARE.fullmatch(name) else json.dumps(name)
-
-
-def written(value: object) -> str:
-    """A value as TOML writes it, tables in one line.
-
-    Args:
-        value: a table, a list, a text, a number, or true or false.
-    """
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {written(each)}" for key, each in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(written(each) for each in value) + "]"
-    return json.dumps(value)
+    return "\n".join([f"[{name}]", *(f"{key_of(key)} = {written(each)}" for key, each in value.items()), ""])

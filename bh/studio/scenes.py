@@ -19,9 +19,9 @@ from bh.model.supports import RigidBody, Support
 from bh.paths.path import Path as Trace
 from bh.paths.record import Record, StepOutcome
 from bh.scene.load import parse_scene
+from bh.scene.toml_text import key_of, written
 from bh.solvers.outcome import Outcome
-from bh.studio.scene_sheets import written
-from bh.studio.sheets import LiveSheet, quoted
+from bh.studio.sheets import LiveSheet
 
 BALANCED = (
     1e-6  # of forces over the typical one of an element; a state with more is not saved as an equilibrium
@@ -144,7 +144,7 @@ def _stiffness(session: Session, crease: str) -> str:
 def _crease_lines(session: Session) -> list[str]:
     lines = []
     for name, law in session.model.creases.items():
-        lines += [f"[creases.{quoted(name)}]", _stiffness(session, name)]
+        lines += [f"[creases.{key_of(name)}]", _stiffness(session, name)]
         lines += [f"rest = {law.rest!r}"] if law.rest != math.pi else []
         lines += [f"law = {written(_law_values(name, law.law))}", ""] if law.law is not None else [""]
     return lines
@@ -164,11 +164,11 @@ def _fold_lines(sheet: LiveSheet, session: Session) -> list[str]:
     for name, angle in session.controls.folds.items():
         rest = fold_of(session.model, name, angle).rest
         if rest is not None:
-            rows.append(f"  {{ crease = {quoted(name)}, rest = {rest!r} }},")
+            rows.append(f"  {{ crease = {written(name)}, rest = {rest!r} }},")
             continue
         angle = sheet.sense(name) * angle + 0.0  # without -0.0
         spring = _stiffness(session, name)
-        rows.append(f"  {{ crease = {quoted(name)}, by = {angle!r}{', ' if spring else ''}{spring} }},")
+        rows.append(f"  {{ crease = {written(name)}, by = {angle!r}{', ' if spring else ''}{spring} }},")
     return ["fold = [", *rows, "]"] if rows else []
 
 

@@ -17,6 +17,7 @@ from fem.shell import first_frames, maps, shell_elements
 from fem.spaces import tables
 from fem.system import ShellSystem
 from meshes.curved import QuadraticMesh, lay_on, lift
+from meshes.errors import MeshError
 from verification.theory import curved_shells as curved
 from verification.theory.shell_benchmarks import FULL_MOMENT, grid, rectangle
 
@@ -190,6 +191,13 @@ def test_the_hook_as_a_beam_is_softer_by_its_torsion() -> None:
 
 
 def test_a_surface_refuses_what_it_cannot_be() -> None:
+    chart = rectangle(2.0, 1.5, 4, 3)
+    with np.errstate(invalid="ignore"):
+        for odd in (lambda at: at, lambda at: np.column_stack((at, np.sqrt(at[:, 0] - 1.0)))):
+            with pytest.raises(MeshError, match="finite points"):
+                lay_on(chart, odd)
+    with pytest.raises(MeshError, match="no area"):
+        lay_on(chart, lambda at: np.column_stack((at[:, :1], 0.0 * at)))
     mesh = surface()
     other = bh.Model(surface().sheet, SHEET, formulation="shell")
     step = load_steps(other.support("edge:start", "xyz").force("edge:end", total=(0, 0, 1)))[0]

@@ -82,6 +82,13 @@ def test_a_port_that_is_taken_is_one_line() -> None:
     window.close()
 
 
+@pytest.mark.parametrize("port", [70_000, -1])
+def test_a_port_that_there_is_not_is_one_line(port: int) -> None:
+    """The system would take 4464 for 70,000."""
+    with pytest.raises(InputError, match=f"no port {port}; take one of 0 to 65535"):
+        Opened(port=port)
+
+
 def test_a_script_waits_and_a_closed_window_ends_it(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(

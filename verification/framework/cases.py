@@ -72,7 +72,7 @@ STUDIES = (
     Study("appendix_b_fields", "B", part_of="appendix_b", seconds=23),
     Study("appendix_b_sheets", "B", part_of="appendix_b", seconds=3),
     Study("shell_benchmarks", "solver", seconds=8),
-    Study("curved_shells", "solver", seconds=14),
+    Study("curved_shells", "solver", seconds=11),
     Study("eigenvalues", "solver", seconds=14),
     Study("loads", "solver", seconds=18),
     Study("actuated", "solver", seconds=3),
