@@ -1,4 +1,4 @@
-"""Strips that bend in their plane, meshes of App. B (a), stiffness, buckling and response (docs/formulation, stiffness)."""
+"""Strips in their plane, App. B (a), stiffness, buckling and response (docs/formulation.md, docs/stiffness.md)."""
 
 from __future__ import annotations
 
