@@ -228,7 +228,10 @@ def _trouble(row: Row) -> str:
             f"shell {row.truth:.4g} N mm ({row.bar:.2%}): {row.apart:.2%} apart"
         )
     if not row.balances:
-        words.append(f"work {row.work:.5g}, energy gained {row.gained:.5g} N mm, allowed {row.allowed:.2g}")
+        off = abs(row.work / row.gained - 1.0) if row.gained else math.inf
+        words.append(
+            f"work {row.work:.5g}, energy gained {row.gained:.5g} N mm: {off:.3%} apart, {row.allowed:.3%} allowed"
+        )
     return "; ".join(words)
 
 
