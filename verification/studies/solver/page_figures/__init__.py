@@ -13,7 +13,7 @@ from verification.studies.solver.page_figures.contact import touches
 from verification.studies.solver.page_figures.drawing import drawings
 from verification.studies.solver.page_figures.materials import grains, stresses, wide_creases
 from verification.studies.solver.page_figures.pinching import pinches
-from verification.studies.solver.page_figures.strips import membranes, pressures, responses, sectors
+from verification.studies.solver.page_figures.strips import couples, membranes, pressures, responses, sectors
 
 STUDIES: dict[str, Callable[[CaseResult, bool], None]] = {
     "strips bent in their plane": membranes,
@@ -23,6 +23,7 @@ STUDIES: dict[str, Callable[[CaseResult, bool], None]] = {
     "wide creases": wide_creases,
     "stiffness, buckling and response": responses,
     "pressure at a free edge": pressures,
+    "couples": couples,
     "moulds and a crushed corrugation": touches,
     "calibration": calibration,
     "pinches": pinches,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import bh
 import meshes
@@ -12,6 +13,11 @@ from verification.framework.checks import CaseResult, Solved
 
 EXAMPLES = Path(__file__).resolve().parents[4] / "examples"
 BARS = "bars-and-hinges"
+LENS = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="100mm" viewBox="0 0 100 100" fill="none">'
+    '<rect width="100" height="100" stroke="black"/><path d="M0,50 C30,20 70,20 100,50" stroke="red"/>'
+    '<path d="M0,50 C30,80 70,80 100,50" stroke="red"/></svg>'
+)
 KIRIGAMI = (
     ("shell", 2.0),
     ("consistent", 1.2),
@@ -39,6 +45,7 @@ def drawings(result: CaseResult, quick: bool) -> None:
     _waves(result, BARS, near, "gmsh, 5 mm", judge)
     lines = bh.rulings.rulings(coarse[-1], spacing=5)
     _waves(result, BARS, meshes.ruled(pattern, lines, spacing=5), "along rulings", judge)
+    _lens(result)
     slits = read_pattern(EXAMPLES / "kirigami.svg")
     for formulation, size in () if quick else KIRIGAMI:
         state, path = pulled(slits, formulation, size)
@@ -64,6 +71,26 @@ def _waves(
         path=path,
     )
     return path
+
+
+def _lens(result: CaseResult) -> None:
+    """A square with two arcs between its sides: by gmsh, and with bars and hinges along its rulings too."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "lens.svg"
+        file.write_text(LENS)
+        pattern = read_pattern(file)
+    mesh = meshes.unstructured(pattern, size=4.0)
+
+    def folded(on: meshes.SheetMesh, formulation: str, name: str) -> bh.Path:
+        model = bh.Model(on, bh.Sheet(E=4000.0, nu=0.0, t=0.2), formulation=formulation)
+        path = bh.trace(model.fold("all", by=0.8, Lstar=25.0), estimate=False, neighbours=False).require()
+        params = {"formulation": formulation, "mesh": name}
+        result.check("energy of a lens", path[-1].energy.total, unit="N mm", params=params, path=path)
+        return path
+
+    judge = folded(mesh, "consistent", "gmsh")
+    folded(mesh, BARS, "gmsh")
+    folded(meshes.ruled(pattern, bh.rulings.rulings(judge[-1], 4.0), 4.0), BARS, "along rulings")
 
 
 def pulled(pattern: meshes.CreasePattern, formulation: str, size: float) -> tuple[bh.State, Solved]:

@@ -85,6 +85,18 @@ def sectors(result: CaseResult, quick: bool) -> None:
             params={"formulation": formulation, "along": along, "rows": rows},
             path=path,
         )
+    ends = {
+        name: reached_energy(folded(sector(16, 2, "staggered"), "a", 0.38, name))
+        for name in (ConstantStrain.name, "linear-shell")
+    }
+    result.check(
+        "energy of App. B (a) with constant strains",
+        ends[ConstantStrain.name],
+        unit="N mm",
+        reference=ends["linear-shell"],
+        source="the linear shell of fem, the same mesh",
+        params={"along": 16, "rows": 2},
+    )
 
 
 def pressures(result: CaseResult, quick: bool) -> None:
@@ -102,6 +114,54 @@ def pressures(result: CaseResult, quick: bool) -> None:
         path = bh.trace(held.step(pressure), estimate=False, neighbours=False).require()
         params = {"p L^3 / D": load}
         result.check("iterations of a blown cantilever", path.iterations, params=params, path=path)
+
+
+def couples(result: CaseResult, quick: bool) -> None:
+    """How far a clamped strip twists under a couple about its axis, and bends in its plane under one across.
+
+    Args:
+        result: gets the checks.
+        quick: the consistent formulation alone.
+    """
+    sheet, long, wide = bh.Sheet(E=4000.0, nu=0.3, t=0.2), 60.0, 10.0
+    a = math.sqrt(24.0 * (1.0 - sheet.nu)) / wide * long
+    rigidity = sheet.E / (2.0 + 2.0 * sheet.nu) * wide * sheet.t**3 / 3.0
+    twist, bend = 1e-4, 0.01  # N mm
+    twisted = twist * long * (1.0 - math.tanh(a) / a) / rigidity
+    aside = bend * 45.0**2 / 2.0 / (sheet.E * sheet.t * wide**3 / 12.0)
+    kinds: dict[str, tuple[int, int, Kind]] = {
+        "consistent": (24, 4, "staggered"),
+        "shell": (12, 2, "mirrored"),
+    }
+    for formulation in ("consistent",) if quick else ("consistent", "shell"):
+        along, rows, kind = kinds[formulation]
+        mesh = meshes.structured(meshes.strip(long, wide), along=along, rows=rows, kind=kind)
+        model = bh.Model(mesh, sheet, formulation=formulation).support("edge:start", "xyz", clamp=True)
+        params = {"formulation": formulation, "along": along, "rows": rows}
+        end = mesh.nodes("edge:end")
+        y = mesh.points[end, 1] - 0.5 * wide
+        path = bh.trace(model.step(bh.Couple("edge:end", (twist, 0.0, 0.0)))).require()
+        found = float(y @ path[-1].displacement("edge:end")[:, 2] / (y @ y))
+        result.check(
+            "twist of a strip under a couple",
+            found,
+            unit="rad",
+            reference=twisted,
+            source="Reissner (1952), a clamp that hinders warping",
+            params=params,
+            path=path,
+        )
+        path = bh.trace(model.step(bh.Couple("edge:end", (0.0, 0.0, bend)))).require()
+        found = float(path[-1].displacement("near:45,5")[:, 1].mean())
+        result.check(
+            "bend of a strip in its plane under a couple",
+            found,
+            unit="mm",
+            reference=aside,
+            source="M x^2 / (2 E I)",
+            params=params,
+            path=path,
+        )
 
 
 def responses(result: CaseResult, quick: bool) -> None:
