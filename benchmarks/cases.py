@@ -14,6 +14,7 @@ import bh
 import meshes
 from bh.formulations.registry import formulation
 from bh.loading.builder import load_steps
+from bh.mechanics.bars_and_hinges.system import BarsAndHingesSystem
 from bh.runtime.threads import one_blas_thread
 from bh.solvers import pardiso
 
@@ -83,6 +84,7 @@ def one_iteration(make: Callable[[], bh.Model]) -> dict[str, Any]:
     system = formulation(model.formulation).system(model, load_steps(model)[0], None)
     q = system.start()
     memory["system"] = peak()
+    assert isinstance(system, BarsAndHingesSystem)
     began = time.thread_time()
     pattern = system._pattern
     took_pattern = time.thread_time() - began

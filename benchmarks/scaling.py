@@ -1,6 +1,6 @@
 """What sweeps cost beside the solver, and how they scale on this machine: the figures of docs/scaling.md.
 
-.venv/bin/python -m benchmarks.scaling [--points 120]
+.venv/bin/python -m benchmarks.scaling [--points 120] [--record]
 """
 
 from __future__ import annotations
@@ -10,11 +10,12 @@ import os
 import resource
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 
 import bh.sweep
+from benchmarks.record import Measured, with_option
 from bh.applications.inverse.simulate import SegmentTask
 from bh.sweep.points import Value
 from bh.sweep.pools import Pool
@@ -26,22 +27,24 @@ def nothing(point: Mapping[str, Value]) -> dict[str, float]:
     return {"value": float(point["x"])}
 
 
-def main() -> None:
+def main(words: Sequence[str] | None = None) -> None:
     """Print what a sweep costs a point, and how it scales from one process to two."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = with_option(argparse.ArgumentParser(description=__doc__), "scaling")
     parser.add_argument("--points", type=int, default=120, help="segments a run")
-    count = parser.parse_args().points
+    given = parser.parse_args(words)
+    count, found = given.points, Measured("scaling", "What sweeps cost beside the solver", words)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "data.nc"
         points = bh.sweep.grid({"x": list(range(3000))})
         for chunk in (1, 50):
             for name, pool in (("this process", 0), ("2 processes", 2)):
-                print(
-                    f"{name}, chunk {chunk}: {1e3 * timed(nothing, points, file, pool, chunk)[0] / 3000:.3f} ms a point"
-                )
+                cost = 1e3 * timed(nothing, points, file, pool, chunk)[0] / 3000
+                print(f"{name}, chunk {chunk}: {cost:.3f} ms a point")
+                found.add("time a point", cost, "ms", {"by": name, "chunk": chunk})
             with closing(bh.sweep.Dask(workers=2)) as cluster:
                 seconds, _ = timed(nothing, points, file, cluster, chunk)
             print(f"Dask, 2 processes, chunk {chunk}: {1e3 * seconds / 3000:.3f} ms a point")
+            found.add("time a point", 1e3 * seconds / 3000, "ms", {"by": "Dask, 2 processes", "chunk": chunk})
         each = bh.sweep.table(
             {
                 "k0": [0.007 * (i + 0.5) / count for i in range(count)],
@@ -56,6 +59,12 @@ def main() -> None:
             f"2 processes {both:.2f} s ({cpu_both:.2f} s CPU)"
         )
         print(f"efficiency {alone / (2.0 * both):.2f}; in CPU time {cpu / cpu_both:.2f}")
+        for number, clock, spent in ((1, alone, cpu), (2, both, cpu_both)):
+            found.add("time of all segments", clock, "s", {"processes": number, "segments": count})
+            found.add("processor time of all segments", spent, "s", {"processes": number, "segments": count})
+        found.add("efficiency of two processes", alone / (2.0 * both), "", {"segments": count})
+        found.add("efficiency of two processes, in processor time", cpu / cpu_both, "", {"segments": count})
+    found.write(given.record)
 
 
 def timed(

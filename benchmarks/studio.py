@@ -1,18 +1,21 @@
 """How long from the slider to the new state in the browser: `python -m benchmarks.studio`, on a quiet machine.
 
 The browser runs on the same machine, without a graphics card. Times are of whole events: the message, the solve, the
-frame and its drawing. `--session` leaves the window out.
+frame and its drawing. `--session` leaves the window out. Sizes may be given as numbers 1 to 3; `--record` keeps what
+was measured.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
 import bh
 import meshes
+from benchmarks.record import Measured, Params, with_option
 from bh.live import Session
 from bh.runtime.terminal import say
 from bh.studio.sheets import LiveSheet, of_model
@@ -67,20 +70,28 @@ def window_times(what: LiveSheet) -> list[float]:
     return times[5:]
 
 
-def main() -> None:
+def main(words: Sequence[str] | None = None) -> None:
     """Print a line a size."""
-    for along, rows in CELLS:
-        what = sheet(along, rows)
+    parser = with_option(argparse.ArgumentParser(description=__doc__.splitlines()[0]), "studio")
+    parser.add_argument("sizes", nargs="*", type=int, default=range(1, len(CELLS) + 1), metavar="1 to 3")
+    parser.add_argument("--session", action="store_true", help="leave the window out")
+    given = parser.parse_args(words)
+    found = Measured("studio", "Events of a slider", words)
+    for number in given.sizes:
+        what = sheet(*CELLS[number - 1])
         size = Session(what.model).size
         kinds = []
         for rests, name in ((False, "session, dragged"), (True, "session, at rest after each event")):
             times, spent = session_times(what, rests)
             kinds += [(name, times), (f"{name}, of the processor", spent)]
-        if "--session" not in sys.argv:
+        if not given.session:
             kinds.append(("window", window_times(what)))
         for name, measured in kinds:
             middle, most = 1e3 * np.percentile(measured, [50, 95])
             say(f"{size:,} unknowns, {name}: median {middle:.0f} ms, 95th percentile {most:.0f} ms")
+            params: Params = {"unknowns": size, "of": name}
+            found.spread("time of an event", [1e3 * each for each in measured], "ms", params, size)
+    found.write(given.record)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ the window says that a run from flat ends elsewhere, from the state beside it. S
 with exit code 1 where a state is out of balance, a scene does not end in the state that was seen, or the memory has
 grown by more than `LEAK` since the first `WARM` seconds. By then every way of handling has
 been gone, so that the kernels that they take are there: one that is compiled keeps about 1 MB, one that is loaded from
-the cache half as much.
+the cache half as much. `--record` keeps what was seen.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import json
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
@@ -27,6 +28,7 @@ from zipfile import ZipFile
 
 import numpy as np
 
+from benchmarks.record import Measured, with_option
 from bh.commands.run import solve
 from bh.errors import InputError
 from bh.formulations.protocols import PlacedSystem
@@ -245,29 +247,64 @@ def resident() -> float:
     return float(importlib.import_module("psutil").Process().memory_info().rss) / 2**20  # it has no types
 
 
-def main() -> int:
+def keep(found: Measured, hand: Hand, memory: list[float], compiled: int) -> None:
+    """What was seen, as figures of a record.
+
+    Args:
+        found: takes them.
+        hand: that has handled.
+        memory: MB at the base, every minute behind it, and at the end.
+        compiled: kernels that were compiled.
+    """
+    log = hand.log
+    counts: dict[str, float] = {
+        "wishes": log.actions,
+        "frames": log.frames,
+        "states at rest": log.rests,
+        "snaps told": log.snaps,
+        "frames out of balance": log.off,
+        "scenes solved": log.compared,
+        "scenes solved from the state beside them": log.beside,
+        "scenes that did not end in the state that was seen": len(log.wrong) + len(log.unreached),
+        "kernels compiled": compiled,
+    }
+    for quantity, value in counts.items():
+        found.add(quantity, value, "", {})
+    found.add("largest imbalance", log.worst, "1", {})
+    found.add("slowest answer, processor time", log.slowest, "s", {})
+    readings = {"base": memory[0], "least": min(memory), "largest": max(memory), "end": memory[-1]}
+    for at, value in {**readings, "grown": memory[-1] - memory[0]}.items():
+        found.add("memory from the base on", value, "MB", {"at": at})
+
+
+def main(words: Sequence[str] | None = None) -> int:
     """Print what was seen, and a line every minute of the processor."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = with_option(argparse.ArgumentParser(description=__doc__.splitlines()[0]), "studio_dragging")
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = parser.parse_args(words)
+    found = Measured("studio_dragging", "Random handling", words)
     hand = Hand(given.seed)
     compiled: list[str] = []
-    began, told, base = time.process_time(), 0.0, 0.0
+    began, told = time.process_time(), 0.0
+    memory: list[float] = []
     with compilations_heard(compiled.append):
         while (spent := time.process_time() - began) < given.seconds:
             hand.act()
-            if not base and spent > min(WARM, 0.5 * given.seconds):
-                base = resident()
-                say(
-                    f"{spent:.0f} s: {base:.0f} MB are the base, ways not gone until now: {set(WAYS) - hand.gone}"
-                )
+            if not memory and spent > min(WARM, 0.5 * given.seconds):
+                memory.append(resident())
+                gone = f"ways not gone until now: {set(WAYS) - hand.gone}"
+                say(f"{spent:.0f} s: {memory[0]:.0f} MB are the base, {gone}")
             if spent - told > MINUTE:
-                told = spent
-                say(f"{spent:.0f} s: {resident():.0f} MB, {len(compiled)} kernels compiled, {hand.log}")
+                told, now = spent, resident()
+                memory += [now] if memory else []
+                say(f"{spent:.0f} s: {now:.0f} MB, {len(compiled)} kernels compiled, {hand.log}")
                 sys.stdout.flush()
-    grown = resident() - base
+    memory.append(resident())
+    grown = memory[-1] - memory[0]
     say(f"{spent:.0f} s of the processor, memory grown by {grown:.0f} MB, {hand.log}")
+    keep(found, hand, memory, len(compiled))
+    found.write(given.record)
     return int(grown > LEAK or hand.log.off > 0 or bool(hand.log.wrong or hand.log.unreached))
 
 

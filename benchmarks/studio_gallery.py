@@ -2,19 +2,21 @@
 
 `BH_DRAWINGS=FOLDER` names the folder. Of every drawing the slider is moved in forty events, each with the budget of a
 frame, then it is left until the sheet is at rest. Times are of the processor. A stall is an answer that takes more than
-a second. Arguments are parts of names of drawings; without any all are opened.
+a second. Arguments are parts of names of drawings; without any all are opened. `--record` keeps what was measured.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
-import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.record import Measured, with_option
 from bh.errors import InputError
 from bh.runtime.terminal import say
 from bh.studio.desk import Desk
@@ -80,10 +82,13 @@ def run(file: Path) -> Run:
     return Run(opened, slowest, spent, len(desk.session.mesh.triangles), note, share)
 
 
-def main() -> None:
+def main(words: Sequence[str] | None = None) -> None:
     """Print a line a drawing, and the counts."""
-    folder = os.environ.get("BH_DRAWINGS", "")
-    parts = sys.argv[1:]
+    parser = with_option(argparse.ArgumentParser(description=__doc__.splitlines()[0]), "studio_gallery")
+    parser.add_argument("parts", nargs="*", help="parts of names of drawings")
+    given = parser.parse_args(words)
+    measured = Measured("studio_gallery", "Drawings of a folder, by the slider", words)
+    folder, parts = os.environ.get("BH_DRAWINGS", ""), given.parts
     files = (
         sorted(each for each in Path(folder).rglob("*") if each.suffix.lower() in PATTERNS) if folder else []
     )
@@ -105,6 +110,14 @@ def main() -> None:
         f"{len(runs)} drawings, {len(opened)} opened, {len(there)} at {WANTED:.0f} %, "
         f"{len(calm)} of them without a stall above {STALL:.0f} s"
     )
+    for quantity, value in (("played", runs.values()), ("opened", opened), ("there", there), ("calm", calm)):
+        measured.add("drawings", len(value), "", {"that are": quantity})
+    if there:
+        params = {"that are": "there"}
+        measured.add("slowest answer, largest", max(each.slowest for each in there), "s", params)
+        measured.spread("slowest answer", [each.slowest for each in there], "s", params)
+        measured.spread("all answers of a drawing", [each.spent for each in there], "s", params)
+    measured.write(given.record)
 
 
 if __name__ == "__main__":

@@ -9,17 +9,20 @@ it.
 
 A browser that finds no graphics card draws WebGL by SwiftShader and composes the page itself: so it is started here.
 `--composed` tells it to take SwiftShader for a card, as the tests do, which it then composes the whole page by. Sizes
-may be given as numbers 1 to 3. On a busy machine `nice` does not help much: Chromium sets threads of its own back to 0.
+may be given as numbers 1 to 3; `--record` keeps what was measured. On a busy machine `nice` does not help much:
+Chromium sets threads of its own back to 0.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
-import sys
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks.record import Measured, with_option
 from benchmarks.studio import CELLS, sheet
 from bh.live import Session
 from bh.runtime.terminal import say
@@ -76,21 +79,35 @@ def measured(
     return times[FIRST:], spent[FIRST:]
 
 
-def main() -> None:
+def main(words: Sequence[str] | None = None) -> None:
     """Print a line a size and a way of moving."""
-    options = OPTIONS if "--composed" in sys.argv else PLAIN
-    chosen = [int(each) - 1 for each in sys.argv[1:] if each.isdigit()] or range(len(CELLS))
-    for number in chosen:
-        what = sheet(*CELLS[number])
+    parser = with_option(argparse.ArgumentParser(description=__doc__.splitlines()[0]), "studio_latency")
+    parser.add_argument("sizes", nargs="*", type=int, default=range(1, len(CELLS) + 1), metavar="1 to 3")
+    parser.add_argument("--composed", action="store_true", help="a browser that takes SwiftShader for a card")
+    given = parser.parse_args(words)
+    found = Measured("studio_latency", "From the slider to the picture", words)
+    for number in given.sizes:
+        what, asked = sheet(*CELLS[number - 1]), ASKED[number - 1]
         size = Session(what.model).size
         for name, pause in (("drag", 0.0), ("pause", 1.0)):
-            times, spent = measured(what, pause, options)
+            times, spent = measured(what, pause, OPTIONS if given.composed else PLAIN)
             middle, most = np.percentile(times, [50, 95])
+            load = os.getloadavg()[0]
             say(
                 f"{size:,} unknowns, {name}: median {middle:.0f} ms, 95th percentile {most:.0f} ms, processor "
-                f"{np.median(spent):.0f} ms, {len(times)} events ({ASKED[number]} ms asked); "
-                f"load {os.getloadavg()[0]:.1f}"
+                f"{np.median(spent):.0f} ms, {len(times)} events ({asked} ms asked); "
+                f"load {load:.1f}"
             )
+            params = {
+                "unknowns": size,
+                "moved": name,
+                "asked": asked,
+                "composed": given.composed,
+                "load": load,
+            }
+            found.spread("time from the slider to the picture", times, "ms", params, size)
+            found.spread("processor time of an event", spent, "ms", params, size)
+    found.write(given.record)
 
 
 if __name__ == "__main__":

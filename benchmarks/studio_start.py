@@ -4,9 +4,10 @@ The command runs in a process of its own, and who asks is a socket in place of a
 The slider goes to 30 % as soon as the sheet is there; the picture is that in equilibrium with it. Seconds of the
 processor are those of the command, which a busy machine hardly changes.
 
-With `--browser` the command opens the browser of this machine itself, in a new profile and without a graphics card,
-and the picture is one that was drawn in its page; the processor's seconds are those of both then. The page's times,
-counted from its first byte, are told besides: sheet, and flat and folded picture.
+With `--browser` another start is measured besides: the command opens the browser of this machine itself, in a new
+profile and without a graphics card, and the picture is one that was drawn in its page; the processor's seconds are
+those of both then. The page's times, counted from its first byte, are told besides: sheet, and flat and folded picture.
+`--record` keeps what was measured.
 """
 
 from __future__ import annotations
@@ -21,12 +22,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import tornado.httpclient
 import tornado.websocket
 
+from benchmarks.record import Measured, with_option
 from bh.runtime.terminal import say
 from tests.unit.browsers import OPTIONS, PROGRAM
 
@@ -145,16 +148,22 @@ def _processor() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def main() -> None:
+def main(words: Sequence[str] | None = None) -> None:
     """Print a line a file."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = with_option(argparse.ArgumentParser(description=__doc__.splitlines()[0]), "studio_start")
     parser.add_argument("files", nargs="*", default=["examples/wave.svg"])
-    parser.add_argument("--browser", action="store_true", help="open one, and look at its page")
-    given = parser.parse_args()
+    parser.add_argument("--browser", action="store_true", help="besides, open one and look at its page")
+    given = parser.parse_args(words)
+    found = Measured("studio_start", "From the command to the first folded picture", words)
     for file in given.files:
-        times = np.array([(seen if given.browser else start)(file) for _ in range(RUNS)])
-        (wall, cpu), (least, _) = np.median(times, axis=0), times.min(axis=0)
-        say(f"{file}: median {wall:.1f} s (least {least:.1f} s), {cpu:.1f} s of the processor")
+        for way, asked in (("socket", start), ("browser", seen))[: 1 + given.browser]:
+            times = np.array([asked(file) for _ in range(RUNS)])
+            (wall, cpu), (least, _) = np.median(times, axis=0), times.min(axis=0)
+            say(f"{file}, {way}: median {wall:.1f} s (least {least:.1f} s), {cpu:.1f} s of the processor")
+            params = {"file": file, "by": way}
+            found.spread("time from the command to the folded picture", times[:, 0].tolist(), "s", params)
+            found.spread("processor time of the start", times[:, 1].tolist(), "s", params)
+    found.write(given.record)
 
 
 if __name__ == "__main__":

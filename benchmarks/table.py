@@ -1,5 +1,7 @@
 """Measure the speed of one Newton iteration and of whole folds, and write docs/performance.md: `make bench-table`.
 
+What was measured is kept as a record, verification/records/bench_table.json, which the figures of the page lead to.
+
 Every case runs in a process of its own, so that its peak memory is its own, with one thread.
 """
 
@@ -18,11 +20,13 @@ import numpy as np
 
 import bh
 from benchmarks.cases import SHEETS, STRIPS, least, one_iteration, sector, strip, wide
+from benchmarks.record import Measured, Params, link, processor
 from bh.commands.warm_up import warm_up
 from bh.model.refinement import with_mesh
 from bh.paths.provenance import versions
 from bh.runtime.threads import one_blas_thread
 from bh.solvers import pardiso
+from verification.framework.run import RECORDS
 from verification.studies.app_b.appendix_b import model as appendix_b
 from verification.theory.array_annulus import ENERGIES, ROWS, array_annulus
 
@@ -69,30 +73,50 @@ def near(unknowns: int) -> float | None:
     return next((ms for n, ms in TARGETS.items() if 0.9 < unknowns / n < 1.1), None)
 
 
-def row(found: dict[str, Any]) -> str:
-    """A case as a row of a table."""
-    ms = {key: 1e3 * found[key] for key in ("evaluate", "assemble", "factorise", "solve", "total")}
-    target = near(found["unknowns"])
-    goal = "" if target is None else f"{target:g} ({'met' if ms['total'] <= target else 'missed'})"
-    kilobytes = found["memory"]["iteration"] / found["unknowns"] / 1e3
-    memory = f"{kilobytes:.1f}" if found["unknowns"] > 5_000 else ""
+def row(found: dict[str, Any], keep: Keep, **which: str) -> str:
+    """A case as a row of a table; `keep` takes its figures, `which` tells them from those of other rows."""
+    size = found["unknowns"]
+    target = near(size)
+    goal = "" if target is None else f"{target:g} ({'met' if 1e3 * found['total'] <= target else 'missed'})"
+    seconds = {
+        "assembly": found["evaluate"] + found["assemble"],
+        "factorisation": found["factorise"],
+        "solve": found["solve"],
+        "iteration": found["total"],
+        "pattern once": found["pattern"] + found["analysis"],
+    }
+    params: Params = {**which, "unknowns": size}
+    ms = {key: keep(f"time of {key}", 1e3 * value, "ms", params) for key, value in seconds.items()}
+    kilobytes = found["memory"]["iteration"] / size / 1e3
+    memory = keep("peak memory an unknown", kilobytes, "kB", params, ".1f") if size > 5_000 else ""
     cells = [
-        f"{found['unknowns']:,}",
+        f"{size:,}",
         found["solver"],
-        number(ms["evaluate"] + ms["assemble"]),
-        number(ms["factorise"]),
-        number(ms["solve"]),
-        number(ms["total"]),
+        *(ms[key] for key in list(ms)[:4]),
         goal,
-        number(1e3 * found["pattern"] + 1e3 * found["analysis"]),
+        ms["pattern once"],
         memory,
     ]
     return "| " + " | ".join(cells) + " |"
 
 
-def number(value: float) -> str:
-    """Three digits, or whole numbers from 100 on."""
-    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+def number(value: float, digits: str = "") -> str:
+    """As `digits` says; without it three digits, or whole numbers from 100 on."""
+    return f"{value:{digits or (',.0f' if value >= 100 else '.3g')}}"
+
+
+class Keep:
+    """Puts a figure into the record, and gives it as a link to there."""
+
+    def __init__(self, found: Measured) -> None:
+        """`found` takes the figures."""
+        self.found = found
+
+    def __call__(self, quantity: str, value: float, unit: str, params: Params, digits: str = "") -> str:
+        """The figure as `number` writes it, for a table or a line of text."""
+        self.found.add(quantity, value, unit, params)
+        title = " | ".join([quantity, *(f"{key}={value}" for key, value in params.items())])
+        return link(number(value, digits), "table", title)
 
 
 def exponent(cases: list[dict[str, Any]]) -> float:
@@ -108,28 +132,30 @@ HEAD = (
 )
 
 
-def tables() -> list[str]:
-    """Newton iterations of growing sheets, phase by phase."""
+def tables(keep: Keep) -> list[str]:
+    """Newton iterations of growing sheets, phase by phase; `keep` takes the figures."""
     lines: list[str] = []
     for kind, sizes, title in (
         ("strip", STRIPS, "Strips (one row of cells a side of the crease, as App. B)"),
         ("wide", SHEETS, "Wide sheets (refined both ways)"),
     ):
         cases = [measure(kind, size, "chosen") for size in sizes]
-        lines += [f"## {title}", "", HEAD, *map(row, cases), ""]
+        lines += [f"## {title}", "", HEAD, *(row(case, keep, kind=kind, by="chosen") for case in cases), ""]
         grows = exponent(cases)
+        told = keep("exponent of time over unknowns", grows, "", {"kind": kind}, ".2f")
         verdict = "met" if grows <= EXPONENT_TARGET else "missed"
         lines += [
-            f"Time grows with the unknowns to the power {grows:.2f} (target {EXPONENT_TARGET}: {verdict}).",
+            f"Time grows with the unknowns to the power {told} (target {EXPONENT_TARGET}: {verdict}).",
             "",
         ]
         at = next(case for case in cases if 9e4 < case["unknowns"] < 1.1e5)
+        words = "peak memory an unknown after a phase"
+        memory = {phase: value / at["unknowns"] / 1e3 for phase, value in at["memory"].items()}
         phases = ", ".join(
-            f"{phase} {value / at['unknowns'] / 1e3:.2f}"
-            for phase, value in at["memory"].items()
-            if phase != "before"
+            f"{phase} {keep(words, value, 'kB', {'kind': kind, 'phase': phase}, '.2f')}"
+            for phase, value in memory.items()
         )
-        verdict = "met" if at["memory"]["iteration"] / at["unknowns"] / 1e3 <= MEMORY_TARGET else "missed"
+        verdict = "met" if memory["iteration"] <= MEMORY_TARGET else "missed"
         lines += [
             f"Peak memory at {at['unknowns']:,} unknowns after each phase, kB an unknown: {phases} "
             f"(target {MEMORY_TARGET:g}: {verdict}).",
@@ -138,13 +164,14 @@ def tables() -> list[str]:
         if kind == "wide":
             lines += ["Wide sheets by who factorises:", "", HEAD]
             for backend in ("multifrontal", *(["PARDISO"] if pardiso.available() else [])):
-                lines += [row(measure(kind, size, backend)) for size in sizes if size >= 20]
+                large = [measure(kind, size, backend) for size in sizes if size >= 20]
+                lines += [row(case, keep, kind=kind, by=backend) for case in large]
             lines.append("")
     return lines
 
 
-def folds() -> list[str]:
-    """Whole folds: time and iterations against their targets."""
+def folds(keep: Keep) -> list[str]:
+    """Whole folds: time and iterations against their targets; `keep` takes the figures."""
     lines = ["## Whole folds from flat to 90 degrees", ""]
     lines += ["| case | unknowns | iterations | target | time, ms | target |", "|---|---|---|---|---|---|"]
     cases = [("App. B (a), 64 cells, staggered", appendix_b("a"), 22, 10.0)]
@@ -155,9 +182,9 @@ def folds() -> list[str]:
         took = 1e3 * least(lambda model=model: bh.trace(model), 2.0)  # type: ignore[misc]
         assert path.outcome == "reached"
         few, quick = (["missed", "met"][ok] for ok in (path.iterations <= most, took <= ms))
-        lines.append(
-            f"| {name} | {path.unknowns} | {path.iterations} | {most} ({few}) | {took:.1f} | {ms:g} ({quick}) |"
-        )
+        count = keep("iterations of a fold", path.iterations, "", {"case": name}, ".0f")
+        told = keep("time of a fold", took, "ms", {"case": name}, ".1f")
+        lines.append(f"| {name} | {path.unknowns} | {count} | {most} ({few}) | {told} | {ms:g} ({quick}) |")
     lines += ["", "The sector of App. B (a) by every formulation, default settings:", ""]
     lines += [
         "| formulation | cells | unknowns | iterations | time, ms | target |",
@@ -169,9 +196,11 @@ def folds() -> list[str]:
         took = 1e3 * least(lambda model=model: bh.trace(model), 2.0)  # type: ignore[misc]
         assert path.outcome == "reached"
         quick = "met" if took <= ms else "missed"
-        lines.append(
-            f"| {name} | {along} x {rows} | {path.unknowns:,} | {path.iterations} | {took:.1f} | {ms:g} ({quick}) |"
-        )
+        params: Params = {"formulation": name, "cells": f"{along} x {rows}"}
+        count = keep("iterations of a fold", path.iterations, "", params, ".0f")
+        told = keep("time of a fold", took, "ms", params, ".1f")
+        cells = f"{along} x {rows} | {path.unknowns:,} | {count} | {told} | {ms:g} ({quick})"
+        lines.append(f"| {name} | {cells} |")
     path = bh.trace(appendix_b("a"))
     system, record = path.solved()
 
@@ -182,34 +211,29 @@ def folds() -> list[str]:
     with one_blas_thread():
         took = 1e3 * least(iteration)
     goal = "met" if took <= 0.3 else "missed"
+    told = keep("time of an iteration at the end of App. B (a)", took, "ms", {}, ".2f")
     lines += [
         "",
-        f"One iteration at the end of App. B (a), the crease held exactly: {took:.2f} ms (0.3: {goal}).",
+        f"One iteration at the end of App. B (a), the crease held exactly: {told} ms (0.3: {goal}).",
     ]
     return [*lines, ""]
 
 
 def machine() -> str:
     """What it was measured on."""
-    name = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.is_file():
-        name = next(
-            (line.split(":")[1].strip() for line in info.read_text().splitlines() if "model name" in line),
-            name,
-        )
     extra = "with pypardiso" if pardiso.available() else "without pypardiso"
     parts = ", ".join(f"{key} {value}" for key, value in versions().items())
     load = os.getloadavg()[0]
     return (
-        f"Measured on {datetime.now(UTC):%Y-%m-%d} on {name}, {os.cpu_count()} cores, {platform.system()}, {parts}, "
-        f"{extra}. One thread; least processor time of several runs; load of the machine at the start {load:.1f}."
+        f"Measured on {datetime.now(UTC):%Y-%m-%d} on {processor()}, {os.cpu_count()} cores, {platform.system()}, "
+        f"{parts}, {extra}. One thread; least processor time of several runs; load of the machine at the start "
+        f"{load:.1f}."
     )
 
 
 HEAD = (
-    "Written by `make bench-table`; do not edit. Every figure is of the run of that command that is told below, but "
-    "for those of the two sections that tell of runs of their own: this page is the record."
+    "Written by `make bench-table`; do not edit. Every figure is of the run of that command that is told below, and "
+    "leads to its record, but for the last section, which tells of a run of its own."
 )
 TEXT = (Path(__file__).with_name("performance.txt")).read_text(encoding="utf-8")
 
@@ -219,8 +243,9 @@ def main() -> None:
     if len(sys.argv) == 4:
         print(json.dumps(run_case(sys.argv[1], int(sys.argv[2]), sys.argv[3])))
         return
-    about = machine()
-    body = [*tables(), *folds()]
+    about, found = machine(), Measured("table", "Newton iterations and folds")
+    keep = Keep(found)
+    body = [*tables(keep), *folds(keep)]
     page = [
         "# Performance",
         "",
@@ -234,6 +259,7 @@ def main() -> None:
     ]
     PAGE.write_text("\n".join(page), encoding="utf-8")
     print(f"wrote {PAGE}")
+    found.write(RECORDS / "bench_table.json")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import sys
 import time
@@ -106,7 +107,10 @@ def test_attempts_are_kept_and_counted(tmp_path: Path, monkeypatch: pytest.Monke
         0.5,
     )
     assert result.notes == ["a kind: it broke"]
-    assert "| a kind | a promise | 15 | 1 | 0.5 s |" in (tmp_path / "reliability.md").read_text()
+    linked = (tmp_path / "reliability.md").read_text()
+    figures = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", linked)
+    assert "| a kind | a promise | 15 | 1 | 0.5 s |" in figures
+    assert linked.count('attack.json "a kind \\| read ') == 3
 
 
 @linux

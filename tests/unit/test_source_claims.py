@@ -144,7 +144,7 @@ def test_counts_are_told() -> None:
         Verdict.NOT,
         Verdict.MISPRINT,
     ]
-    assert told(records).endswith("0 wrong in print")
+    assert told(records).endswith("3 wrong in print")  # Eq. A.12, 5.4 and 5.6: the record of `appendix_a`
     (_, passed, others), (_, own_passed, own) = tally(records)
     judged = [check for check in records if check.passed is not None]
     assert others + own == len(judged)

@@ -51,6 +51,7 @@ SLOW = {
     "drawings",
     "landing",
     "tolerances",
+    "designs",
     "bend_twist",
     "cones",
     "agreement",

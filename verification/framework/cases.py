@@ -106,6 +106,7 @@ STUDIES = (
     Study("two_models", "6", seconds=36),
     Study("landing", "6", long=True),
     Study("tolerances", "6", long=True),
+    Study("designs", "6", long=True),
 )
 BY_NAME = {study.name: study for study in STUDIES}
 ALL_CASES = tuple(BY_NAME)

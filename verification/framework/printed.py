@@ -6,7 +6,12 @@ A figure of a record is a link to it whose title says which:
     [0.030 %](../verification/records/honesty.json "relative error | scene=1 | read params.estimate | times 100")
 
 The title is a quantity and then, between bars, parameters of the record (`key=value`), what is read from it (`read
-error`; the value unless said), a factor (`times 100`), and of several records `largest`, `least`, `median` or `number`.
+error`; the value unless said), a factor (`times 100`), what is added behind it (`plus 1`), and of several records
+`largest`, `least`, `median` or `number`. A point of a plot of the record is one more record: its quantity is the plot's
+id, its parameters are `series` (as in the legend) and `point` (from 1), its value is y, and `read x` is x:
+
+    [0.54 %](../verification/records/speed_error.json "speed-error-a-energy-time | series=shell, mirrored | point=3")
+
 In a table a bar ends the cell, in titles too: there it is written with a backslash before it.
 The figure has to be the record's, rounded to the digits that are printed.
 """
@@ -18,6 +23,7 @@ import re
 import statistics
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -70,11 +76,11 @@ class Printed:
             InputError: there is no such record, several of them, or nothing that can be read from it.
         """
         try:
-            records = json.loads(self.file.read_text(encoding="utf-8"))["checks"]
+            records = _records(self.file, self.title.partition(" | ")[0])
         except (OSError, ValueError, KeyError) as error:
             raise InputError(f"there are no records in '{self.link}'") from error
-        quantity, *parts = (part.strip() for part in self.title.split(" | "))
-        read, factor, several = "value", 1.0, ""
+        _, *parts = (part.strip() for part in self.title.split(" | "))
+        read, factor, more, several = "value", 1.0, 0.0, ""
         for part in parts:
             word, _, rest = part.partition(" ")
             if part in OF_SEVERAL:
@@ -83,14 +89,16 @@ class Printed:
                 read = rest
             elif word == "times":
                 factor = float(rest)
+            elif word == "plus":
+                more = float(rest)
             elif "=" not in part:
                 raise InputError(f"'{part}' says neither a parameter nor what to read")
         wanted = dict(part.split("=", 1) for part in parts if "=" in part)
-        mine = [r for r in records if r["quantity"] == quantity and _has(r["params"], wanted)]
+        mine = [record for record in records if _has(record["params"], wanted)]
         values = [_read(record, read) for record in mine]
         if not values or (len(values) > 1 and not several):
             raise InputError(f"{len(values) or 'no'} records of '{self.title}' in '{self.link}'")
-        return factor * (OF_SEVERAL[several](values) if several else values[0])
+        return factor * (OF_SEVERAL[several](values) if several else values[0]) + more
 
 
 def printed(page: Path) -> Iterator[Printed]:
@@ -99,6 +107,21 @@ def printed(page: Path) -> Iterator[Printed]:
     for found in LINK.finditer(text):
         words, link, title = found.groups()
         yield Printed(page, text.count("\n", 0, found.start()) + 1, words, link, title.replace("\\|", "|"))
+
+
+@cache
+def _records(file: Path, quantity: str) -> list[dict[str, Any]]:
+    """Records of a quantity, or the points of the plot that has it as its id."""
+    data = json.loads(file.read_text(encoding="utf-8"))
+    points = [
+        {"quantity": quantity, "params": {"series": series["label"], "point": k + 1}, "value": y, "x": x}
+        for case in data.get("cases", [])
+        for plot in case["plots"]
+        if plot["id"] == quantity
+        for series in plot["series"]
+        for k, (x, y) in enumerate(zip(series["x"], series["y"], strict=True))
+    ]
+    return points or [record for record in data["checks"] if record["quantity"] == quantity]
 
 
 def _has(params: dict[str, Any], wanted: dict[str, str]) -> bool:

@@ -58,7 +58,7 @@ def run(
             f"cannot write the folder '{folder}' ({error.strerror}); choose another one"
         ) from error
     refuse_links(folder)
-    file, run_by = folder / "checks.json", _run_by(quick, jobs)
+    file, run_by = folder / "checks.json", conditions(quick, jobs)
     found: list[CaseResult] = []
     with closing(_results(names, folder, quick, report, min(jobs, len(names)))) as results:
         for result in results:
@@ -72,8 +72,8 @@ def run(
             found.append(result)
             found.sort(key=lambda result: names.index(result.name))
             # at once: what is finished outlives whatever happens to the other cases
-            write_json(file, _merged(_known(file), _record(found, run_by)))
-    return _record(found, run_by)
+            write_json(file, _merged(_known(file), record(found, run_by)))
+    return record(found, run_by)
 
 
 def _results(
@@ -126,7 +126,8 @@ def _known(file: Path) -> dict[str, Any]:
     return known
 
 
-def _run_by(quick: bool, jobs: int) -> dict[str, Any]:
+def conditions(quick: bool, jobs: int) -> dict[str, Any]:
+    """What a run was made with, and when: versions, date, machine."""
     return {
         "versions": environment(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -140,7 +141,8 @@ def _run_by(quick: bool, jobs: int) -> dict[str, Any]:
     }
 
 
-def _record(found: Sequence[CaseResult], run_by: dict[str, Any]) -> dict[str, Any]:
+def record(found: Sequence[CaseResult], run_by: dict[str, Any]) -> dict[str, Any]:
+    """What cases found, as files keep it; `run_by` as of `conditions`."""
     return {
         "checks": [check.record() for result in found for check in result.checks],
         **run_by,

@@ -1,8 +1,8 @@
 """The pieces that strips are made of, simulated by the formulation that converges.
 
 What a pinch, a free end or a jump of the curvature does to a folded strip has died out a few widths away: measured, by
-a factor of ten each 5 mm. In between the crease is a plane arc. So a strip is a chain of four kinds of pieces, each of
-one or two curvatures only, whatever the lengths of its segments:
+a factor of three to ten each 5 mm. In between the crease is a plane arc. So a strip is a chain of four kinds of pieces,
+each of one or two curvatures only, whatever the lengths of its segments:
 
 - "arc": how an arc of some curvature before folding goes on, and what lies between its free end and the arc;
 - "pinch": what a pinch adds between the arcs on its two sides, as if it were a point in its middle;

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 import meshes
 from bh import Model, Sheet, trace
 from bh.analysis.alignment import aligned
-from bh.analysis.creases import along, panel_generators
 from bh.analysis.isometric import (
     FoldedCrease,
     InterpolatingSpline,
@@ -24,6 +23,7 @@ from bh.analysis.isometric import (
 )
 from bh.solvers.outcome import Outcome
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
+from verification.studies.app_a.crease_curves import panels, rates
 from verification.theory import cone
 
 Array = NDArray[np.float64]
@@ -80,6 +80,7 @@ def run(context: Context) -> CaseResult:
     _patterns(result, folds)
     _isometry(result)
     _printed_signs(result)
+    rates(result)
     _cone(result)
     _folding(result, context)
     _pictures(result, context, folds)
@@ -256,7 +257,8 @@ def _folding(result: CaseResult, context: Context) -> None:
         for cells in densities[:1] if context.quick else densities:
             context.tell(f"{CASE}: {formulation}, {cells[0]} x {cells[1]} cells a side")
             shapes.append(_uniform(result, formulation, cells))
-            _generators(result, formulation, cells)
+            path = trace(_model(formulation, cells, lambda s: 0.5 * math.pi + 0.1 * np.cos(math.pi * s)))
+            panels(result, path, {"formulation": formulation, "along": cells[0], "rows": cells[1]})
         if len(shapes) > 1:
             result.check(
                 "uniform fold: change of that distance with the mesh",
@@ -329,59 +331,6 @@ def _uniform(result: CaseResult, formulation: str, cells: tuple[int, int]) -> fl
         params=params,
     )
     return gap
-
-
-def _generators(result: CaseResult, formulation: str, cells: tuple[int, int]) -> None:
-    """An angle that changes by 0.2 rad: generators of the panels against A.12, curvature against 5.3."""
-    path = trace(_model(formulation, cells, lambda s: 0.5 * math.pi + 0.1 * np.cos(math.pi * s)))
-    state = path[-1]
-    profile = along(state, "crease")
-    inner = (profile.u > 0.25 * profile.u[-1]) & (profile.u < 0.75 * profile.u[-1])
-    printed = generator_angles(
-        profile.signed_curvature, -profile.torsion, profile.dihedral, profile.fold_rate
-    )
-    theory = profile.signed_curvature / profile.isometric_curvature
-    off: dict[str, float] = {"as derived": 0.0, "as printed": 0.0}
-    for side, ours, theirs in zip(("left", "right"), profile.generator_angles, printed, strict=True):
-        found = panel_generators(state, "crease", side)
-        estimate = np.interp(profile.u, found.u, found.angle)
-        for name, angle in (("as derived", ours), ("as printed", theirs)):
-            off[name] = max(off[name], float(np.degrees(np.abs(estimate - angle)[inner]).max()))
-    params = {"formulation": formulation, "along": cells[0], "rows": cells[1]}
-    judged = formulation == "consistent"  # slanted hinges of one row exaggerate the twist of a panel
-    for quantity, value, unit, tolerance, source in (
-        (
-            "varying fold: kappa over that of Eq. 5.3, less one",
-            float(np.abs(theory - 1.0)[inner].max()),
-            "",
-            0.01,
-            "5.3",
-        ),
-        (
-            "varying fold: generators of the panels, off A.12 as derived",
-            off["as derived"],
-            "degrees",
-            0.5 if judged else None,
-            "A.12",
-        ),
-        (
-            "varying fold: generators of the panels, off A.12 as printed",
-            off["as printed"],
-            "degrees",
-            None,
-            "A.12",
-        ),
-    ):
-        result.check(
-            quantity,
-            value,
-            unit=unit,
-            reference=0.0,
-            source=f"source Eq. {source}",
-            tolerance=tolerance,
-            params=params,
-            path=path,
-        )
 
 
 def _pictures(result: CaseResult, context: Context, folds: dict[str, FoldedCrease]) -> None:

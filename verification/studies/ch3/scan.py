@@ -36,6 +36,7 @@ from verification.studies.ch3.scan_clouds import (
     scanned,
     truncated_normal,
 )
+from verification.studies.ch3.scan_library import beside
 from verification.theory import cone
 
 Array = NDArray[np.float64]
@@ -147,6 +148,8 @@ def _known_motion(result: CaseResult, context: Context, angle: float) -> None:
             source="all but the strays",
             tolerance=0.01,
         )
+        if seed == 1:
+            beside(result, cloud, state, start, found, motion, params)
 
 
 def _exact_cones(result: CaseResult, context: Context, angle: float) -> None:
@@ -206,6 +209,11 @@ def _exact_cones(result: CaseResult, context: Context, angle: float) -> None:
                 "The folded sector against the scan of cones",
                 "Distances of the enriched mesh to the scan, as the source draws them; spots are its holes.",
             )
+    bare = folded_sector("consistent", angle, 1)
+    start = scan.picked(places, bare.points[[bare.mesh.corners[f"corner:{name}"] for name in names]])
+    clean = scan.distances(scan.register(cloud, bare, start).motion.apply(exact), bare)
+    params = {"angle_deg": round(math.degrees(angle), 6), "formulation": "consistent", "rows": 1}
+    result.check("cones without noise: mean of the distances, one row", clean.mean, unit="mm", params=params)
 
 
 def _statistics(
@@ -259,10 +267,11 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
     for mesh, length in (("gmsh", size), ("one row", None)):
         tried = []
         for Lstar in Lstars:
-            known = length == size and Lstar == PAPER_LSTAR
+            known = (length, Lstar) == (size, PAPER_LSTAR)
             path = same if known else folded(sample.pattern, "bars-and-hinges", Lstar, length)
             if not path.reached:
                 continue
+            _one_row(result, name, Lstar, length, (paper[-1], path[-1]))
             try:
                 tried.append((_against(cloud, paper[-1], path[-1]), Lstar))
             except InputError as lost:  # this stiffness has no place beside the others, and says so
@@ -281,8 +290,7 @@ def _pattern(result: CaseResult, context: Context, sample: Sample) -> None:
         (there, moved, surface), Lstar = min(tried, key=lambda one: one[0][0].mean)
         back = scan.distances(moved, surface, "sheet-to-cloud")
         params = {"pattern": name, "mesh": mesh, "formulation": "bars-and-hinges", "Lstar_mm": Lstar}
-        # one row a panel lets bars and hinges bend along its node lines only, which soft springs cannot force: it needs
-        # its own L*, and quick runs try one only
+        # one row a panel bends along its node lines only, and needs an L* of its own: quick runs try one
         judged = sample.claim if mesh == "gmsh" or not context.quick else None
         result.check(
             "pattern: lowest mean distance over L*",
@@ -335,6 +343,27 @@ def _against(cloud: Array, paper: bh.State, state: bh.State) -> tuple[scan.Dista
     found = scan.register(cloud[:4000], surface, scan.align(corners(paper), corners(state)), trim=math.inf)
     moved = found.motion.apply(cloud)
     return scan.distances(moved[: max(len(cloud) // 10, 4000)], surface), moved, surface
+
+
+def _one_row(
+    result: CaseResult, name: str, Lstar: float, size: float | None, states: tuple[bh.State, bh.State]
+) -> None:
+    """How far a sheet of one row of bars and hinges a panel folds with the paper's L*, in the mean of all creases."""
+    if size is not None or Lstar != PAPER_LSTAR:
+        return
+    paper, one_row = states
+    angles = [
+        math.degrees(float(np.mean([np.abs(each.fold_angle(crease)).mean() for crease in each.mesh.creases])))
+        for each in (one_row, paper)
+    ]
+    result.check(
+        "pattern: mean fold angle of all creases, one row of bars and hinges",
+        angles[0],
+        unit="degrees",
+        reference=angles[1],
+        source=f"consistent, L* = {PAPER_LSTAR:g} mm",
+        params={"pattern": name, "Lstar_mm": PAPER_LSTAR},
+    )
 
 
 def _same_mesh(result: CaseResult, name: str, paper: bh.State, same: bh.State, size: float) -> None:

@@ -143,6 +143,8 @@ def _claims(result: CaseResult, data: Any, seconds: float, quick: bool) -> None:
     )
     check("points in the plane: share of designs without a pinch", (pinched[flat & reached] == 0).mean())
     check("strips that clear themselves in space, share", np.nanmean(data["clear"].values))
+    for n in range(1, MOST + 1):
+        check(f"designs of {n} segments", int((data["n"].values[reached] == n).sum()))
     check(
         "time of all targets on all cores",
         seconds,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from verification.theory.shell_benchmarks import STRIP_LENGTH
 from verification.theory.solid_hook import solid_hook
 
 Array = NDArray[np.float64]
+Series = dict[str, Any]
 HARDER = "MacNeal and Harder (1985)"
 SIMO = "Simo, Fox and Rifai (1989)"
 SZE = "Sze, Liu and Lo (2004)"
@@ -26,7 +28,7 @@ CLAMPED_CORNER = 1.0  # and at least beside corners of a clamped end, where they
 
 
 def run(context: Context) -> CaseResult:
-    """Opened ring, pinched hemispheres, twisted strip, hook."""
+    """Opened ring, pinched hemispheres, twisted strip, hook, and a hemisphere that is pinched far."""
     result = CaseResult(
         name="curved_shells",
         title="Benchmarks of curved shells",
@@ -34,10 +36,19 @@ def run(context: Context) -> CaseResult:
         source=f"{HARDER}; {SIMO}; {SZE}; {KNIGHT}; closed forms",
     )
     _opened_ring(result, context)
-    _hemispheres(result, context)
+    series = [*_hemispheres(result, context), *_twisted(result, context), _hook(result, context)]
     _pinched_far(result, context)
-    _twisted(result, context)
-    _hook(result, context)
+    result.plots.append(
+        plot(
+            "curved-convergence",
+            "Displacements by linear theory on finer meshes",
+            "cells along",
+            "distance from the finest mesh, relative",
+            series,
+            "Of each benchmark, of its own finest mesh, which is not shown.",
+            log="xy",
+        )
+    )
     result.notes.append(
         "The hook is a strip in torsion. A shell without transverse shear twists a strip with w t^3 / 3 in place of "
         "Saint-Venant's w t^3 / 3 (1 - 0.63 t / w), 6 % too stiff where t / w is 1 / 10; of the sheets that this "
@@ -110,13 +121,13 @@ def _opened_ring(result: CaseResult, context: Context) -> None:
     )
 
 
-def _hemispheres(result: CaseResult, context: Context) -> None:
+def _hemispheres(result: CaseResult, context: Context) -> Iterator[Series]:
     shapes = {"hole of 18 degrees": curved.open_hemisphere, "closed": curved.closed_hemisphere}
     for name, make in shapes.items():
         context.tell(f"curved_shells: pinched hemisphere, {name}")
         params = {"benchmark": "pinched hemisphere", "shape": name}
         cells = (8, 16, 32) if context.quick else (8, 16, 32, 64)
-        _converge(
+        yield _converge(
             result,
             "displacement under the force",
             cells,
@@ -162,7 +173,7 @@ def _pinched_far(result: CaseResult, context: Context) -> None:
             )
 
 
-def _twisted(result: CaseResult, context: Context) -> None:
+def _twisted(result: CaseResult, context: Context) -> Iterator[Series]:
     for thickness, (_, published) in curved.TWISTED.items():
         for direction, value in published.items():
             context.tell(f"curved_shells: twisted strip, t = {thickness}, force along {direction}")
@@ -172,7 +183,7 @@ def _twisted(result: CaseResult, context: Context) -> None:
             ) -> curved.Benchmark:
                 return curved.twisted_strip(cells, thickness, direction)
 
-            _converge(
+            yield _converge(
                 result,
                 "displacement of the end",
                 (12, 24, 48),
@@ -193,7 +204,7 @@ def _converge(
     published: tuple[float, str],
     params: Mapping[str, object],
     order: float | None,
-) -> None:
+) -> Series:
     """Displacements by linear theory on finer and finer meshes against a published value, and at least their order."""
     found = []
     for n in cells:
@@ -212,6 +223,12 @@ def _converge(
         )
     if order is not None:
         _order(result, quantity, found, order, params)
+    return _distances(", ".join(str(each) for each in params.values()), cells, found)
+
+
+def _distances(label: str, cells: Sequence[int], found: Sequence[float]) -> Series:
+    """From the finest mesh, in parts of its figure."""
+    return line(label, [float(n) for n in cells[:-1]], [abs(each / found[-1] - 1.0) for each in found[:-1]])
 
 
 def _order(
@@ -236,7 +253,7 @@ def _linear(benchmark: curved.Benchmark) -> tuple[Array, Cost]:
     return moved, Cost(unknowns=unknowns, iterations=1, wall_time_s=time.perf_counter() - began)
 
 
-def _hook(result: CaseResult, context: Context) -> None:
+def _hook(result: CaseResult, context: Context) -> Series:
     sizes = ((18, 2), (36, 4)) if context.quick else ((18, 2), (36, 4), (72, 8))
     thin, solid = curved.hook_beam(thin=True), curved.hook_beam(thin=False)
     tips = []
@@ -281,3 +298,4 @@ def _hook(result: CaseResult, context: Context) -> None:
         params={"benchmark": "hook of solid elements", "along": cells[0], "through": cells[2]},
         path=Cost(unknowns=unknowns, wall_time_s=time.perf_counter() - began),
     )
+    return _distances("hook", [along for along, _ in sizes], tips)

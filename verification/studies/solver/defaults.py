@@ -63,12 +63,14 @@ class Scene:
         text: of the scene, TOML; a drawing is `sheet.svg`.
         judges: cells along, and rows, of the shell's two meshes; the last is the truth.
         drawing: SVG, or empty.
+        given: cells along, and rows, of a shipped example of the sheet; they are solved, too.
     """
 
     name: str
     text: str
     judges: tuple[tuple[int, int], tuple[int, int]]
     drawing: str = ""
+    given: tuple[int, int] | None = None
 
     def read(self) -> tuple[Model, Goal]:
         """The model, and the accuracy of a scene that names none."""
@@ -107,6 +109,7 @@ def scenes() -> tuple[Scene, ...]:
             "ring",
             ring + "[sheet]\nE = 4000.0\nt = 0.127\n[[steps]]\nfold = { crease = 'crease', to = 2.2 }\n",
             ((62, 2), (124, 4)),
+            given=(128, 2),
         ),
         Scene("concentric circles", drawn + springs, ((48, 3), (96, 6)), CIRCLES),
     )
@@ -129,6 +132,7 @@ class Found:
     bar: float
     angles: dict[str, float]
     true_angles: dict[str, float]
+    others: dict[str, float]
 
     @property
     def error(self) -> float:
@@ -159,7 +163,26 @@ def examine(scene: Scene) -> Found:
         abs(coarse / fine - 1.0),
         fold_angles(path),
         true,
+        {
+            name: path[-1].energy.total
+            for name, path in _others(model, scene.given).items()
+            if path.reached and path.stable
+        },
     )
+
+
+def _others(model: Model, given: tuple[int, int] | None) -> dict[str, Path]:
+    """The sheet as the source meshes it, and on cells that are given."""
+    pattern = pattern_of(model)
+    if given is None:
+        row = structured(pattern, kind="staggered", aspect_ratio=8.0)
+    else:
+        row = structured(pattern, kind="staggered", along=given[0])
+    found = {"bars and hinges, one row": trace(with_mesh(model, row, "bars-and-hinges"))}
+    if given is not None:
+        mesh = structured(pattern, along=given[0], rows=given[1])
+        found[f"consistent, {given[0]} x {given[1]} cells"] = trace(with_mesh(model, mesh, "consistent"))
+    return found
 
 
 def fold_angles(path: Path) -> dict[str, float]:
@@ -219,6 +242,10 @@ def _record(result: CaseResult, scene: Scene, found: Found) -> None:
         tolerance=0.0,
         params=params,
     )
+    result.check("error that the estimate tells", found.estimate, params=params)
+    for means, energy in found.others.items():
+        words = {"scene": scene.name, "by": means}
+        result.check("energy of the sheet by other means", energy, unit="N mm", params=words)
     result.check(
         "its end is stable", found.stable, reference=1.0, source="asked", tolerance=0.0, params=params
     )
