@@ -42,6 +42,7 @@ KEYS = {
 }
 UNLIKE = {  # verdicts of cases that do not hold whole, or that only measure
     "bending_fit": "reported",
+    "page_figures": "reported",
 }
 SLOW = {
     "appendix_b",
@@ -83,6 +84,7 @@ SLOW = {
     "fig3_11",
     "forward",
     "honesty",
+    "page_figures",
     "problem_c",
     "sheets_3",
     "speed_error",

@@ -92,6 +92,7 @@ STUDIES = (
     Study("branches", "solver", long=True),
     Study("contact", "solver", long=True),
     Study("drawings", "solver", long=True),
+    Study("page_figures", "solver", long=True),
     Study("gradients", "solver", seconds=22),
     Study("top_down", "4", seconds=12),
     Study("bottom_up", "4", seconds=1),
