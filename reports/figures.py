@@ -160,7 +160,7 @@ def picture_link(file: Path) -> tuple[str, int, int]:
     if shown.width > WIDEST:
         shown = shown.resize((WIDEST, round(shown.height * WIDEST / shown.width)), Image.Resampling.LANCZOS)
     sink = io.BytesIO()
-    shown.save(sink, "WEBP", quality=90, method=6)
+    shown.save(sink, "WEBP", quality=90, method=2)  # a third of the time of method 6 for 4 % more bytes
     return ("data:image/webp;base64," + base64.b64encode(sink.getvalue()).decode(), shown.width, shown.height)
 
 

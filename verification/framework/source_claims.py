@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -186,8 +187,16 @@ def judge(claim: SourceClaim, records: Sequence[Numbered]) -> Judged:
 
 def judge_all(records: Iterable[Record]) -> list[Judged]:
     """Every claim with its verdict, in the order of the file; records are numbered from 1."""
-    numbered = list(enumerate(records, start=1))
-    return [judge(claim, numbered) for claim in claims()]
+    by_case: dict[str, list[Numbered]] = {}
+    for item in enumerate(records, start=1):
+        by_case.setdefault(item[1].case, []).append(item)
+    return [judge(claim, _of_its_cases(claim, by_case)) for claim in claims()]
+
+
+def _of_its_cases(claim: SourceClaim, by_case: Mapping[str, list[Numbered]]) -> list[Numbered]:
+    """Records of the cases that a claim names, in their order: no other can speak for it."""
+    cases = {selector.case for selector in (*claim.selectors, *claim.right)}
+    return sorted((item for case in cases for item in by_case.get(case, [])), key=itemgetter(0))
 
 
 def counts(judged: Iterable[Judged]) -> dict[Verdict, int]:
