@@ -14,7 +14,7 @@ from verification.framework.printed import Printed, printed
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 FIGURES = [figure for page in PAGES for figure in printed(page)]
-FEWEST = 1687  # figures that lead to records; more may be linked, none may be lost
+FEWEST = 1742  # figures that lead to records; more may be linked, none may be lost
 
 
 def test_every_printed_figure_is_what_its_record_says() -> None:
