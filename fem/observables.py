@@ -15,7 +15,7 @@ from bh.model.zones import Sections
 from fem import grain
 from fem import sections as by_triangle
 from fem.here import Here
-from fem.shell import ShellElements, maps
+from fem.shell import ShellElements, maps, side_normals
 from fem.spaces import MOMENTS, SLOPES, STRAINS, gradients
 from fem.state import ShellState
 from fem.system import ShellSystem
@@ -164,12 +164,8 @@ def _crease_moments(system: ShellSystem, couples: Array) -> Array:
 
 def _jumps(system: ShellSystem, here: Here) -> Array:
     """(m,) angle between the normals on both sides at the middle of every hinge's edge, rad, mountain positive."""
-    e, t = system.elements, system.elements.tables
-    middle = len(t.s) // 2  # Gauss points are odd in number
-    xe = here.x[system.mesh.triangles]
-    tau = np.einsum("jn,tnc->tjc", t.along[:, middle], xe)
-    across = np.einsum("jn,tnc->tjc", t.across[:, middle], xe)
-    normal = np.cross(tau, across)
+    e = system.elements
+    tau, normal = side_normals(system.mesh, here.x)
     topology = system.mesh.sheet.topology
     left, right = topology.edge_triangles[topology.hinge_edges].T
     one = np.argmax(e.loops.edges[left] == topology.hinge_edges[:, None], axis=1)

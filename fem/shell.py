@@ -311,6 +311,19 @@ def edge_tangents(mesh: ElementMesh, x: Array) -> Array:
     return np.asarray(np.einsum("kp,kec->epc", ds, np.stack((low, middle, high))))
 
 
+def side_normals(mesh: ElementMesh, x: Array) -> tuple[Array, Array]:
+    """(t, 3, 3) tangents, counter-clockwise, and normals of each triangle at the middles of its edges, mm and mm^2.
+
+    Args:
+        mesh: of the elements.
+        x: (n, 3) positions, mm.
+    """
+    table = tables(mesh.degree)
+    middle, xe = len(table.s) // 2, x[mesh.triangles]  # Gauss points are odd in number
+    tau = np.einsum("jn,tnc->tjc", table.along[:, middle], xe)
+    return tau, np.cross(tau, np.einsum("jn,tnc->tjc", table.across[:, middle], xe))
+
+
 def unit(vectors: Array) -> Array:
     """Vectors (..., 3) of length one in the directions of the given ones.
 
@@ -329,11 +342,8 @@ def first_frames(mesh: ElementMesh) -> Frames:
     t0 = unit(edge_tangents(mesh, mesh.nodes))
     if mesh.flat:
         return Frames(t0, np.ascontiguousarray(np.broadcast_to(plane_axes(mesh.sheet)[2], t0.shape)))
-    table = tables(mesh.degree)
-    middle, xe = len(table.s) // 2, mesh.nodes[mesh.triangles]
-    tau, across = (np.einsum("jn,tnc->tjc", each[:, middle], xe) for each in (table.along, table.across))
     normal = np.zeros((len(t0), 1, 3))
-    np.add.at(normal[:, 0], mesh.sheet.topology.triangle_edges, unit(np.cross(tau, across)))
+    np.add.at(normal[:, 0], mesh.sheet.topology.triangle_edges, unit(side_normals(mesh, mesh.nodes)[1]))
     return Frames(t0, unit(normal - (normal * t0).sum(axis=-1, keepdims=True) * t0))
 
 

@@ -19,7 +19,16 @@ from fem.kirchhoff_love import CurvedShell
 from fem.loads import EdgeMoments
 from meshes import SheetMesh
 from meshes.curved import QuadraticMesh, lay_on
-from verification.theory.shell_benchmarks import FULL_MOMENT, STRIP, STRIP_LENGTH, grid, rectangle
+from verification.theory.shell_benchmarks import (
+    FULL_MOMENT,
+    STRIP,
+    STRIP_LENGTH,
+    clamped_sheet,
+    grid,
+    rectangle,
+    rolled_strip_exact,
+    with_couple,
+)
 
 Array = NDArray[np.float64]
 
@@ -157,7 +166,7 @@ def twisted_strip(cells: int, thickness: float, direction: str) -> Benchmark:
     sheet = Sheet(E=TWISTED_E, nu=TWISTED_NU, t=thickness)
     force = np.where(np.array(["x", "y", "z"]) == direction, TWISTED[thickness][0], 0.0)
     ends = mesh.sheet.nodes("edge:end")
-    model = _model(mesh, sheet).support("edge:start", "xyz", clamp=True)
+    model = clamped_sheet(mesh.sheet, sheet)
     return Benchmark(mesh, model.force("edge:end", total=tuple(force)), (int(ends[len(ends) // 2]),))
 
 
@@ -196,7 +205,7 @@ def hook(along: int, across: int) -> Benchmark:
         return np.column_stack((stations[np.rint(u * along).astype(int)], v))
 
     mesh = lay_on(grid(place, along, across), surface)
-    model = _model(mesh, HOOK).support("edge:start", "xyz", clamp=True)
+    model = clamped_sheet(mesh.sheet, HOOK)
     tip = tuple(mesh.sheet.nodes("edge:end").tolist())
     return Benchmark(mesh, model.force("edge:end", total=(0.0, 0.0, 1.0)), tip)
 
@@ -238,28 +247,11 @@ def opened_ring(along: int, steps: int = 3) -> tuple[Benchmark, list[EdgeMoments
         return np.column_stack((radius * np.sin(angle), at[:, 1], radius * (1.0 - np.cos(angle))))
 
     mesh = lay_on(rectangle(STRIP_LENGTH, 1.0, along, max(1, along // 12)), surface)
-    model = _model(mesh, STRIP).support("edge:start", "xyz", clamp=True)
-    moments = []
-    for step in range(steps):
-        model = model.force("corner:low-end", each=(0.0, 0.0, 0.0))  # a step has to act in some way
-        before, after = (-OPENED * FULL_MOMENT * share / steps for share in (step, step + 1))
-        moments.append(EdgeMoments((("edge:end", before, after),)))
+    clamped = clamped_sheet(mesh.sheet, STRIP)
+    model, moments = with_couple(clamped, -OPENED * FULL_MOMENT, steps)
     return Benchmark(mesh, model, tuple(mesh.sheet.nodes("edge:end").tolist())), moments
 
 
 def opened_ring_exact() -> tuple[float, float, float]:
-    """Energy (N mm) and tip x, z (mm) of the opened ring, exactly, of the model that the shell is.
-
-    As `shell_benchmarks.rolled_strip_exact`, with the curvature of the ring taken off: E A e s + E I (s r - k) r = 0
-    and E I (s r - k) s = M.
-    """
-    EI, EA, moment = STRIP.E * STRIP.t**3 / 12.0, STRIP.E * STRIP.t, -OPENED * FULL_MOMENT
-    stretch = 1.0
-    for _ in range(50):
-        rate = (moment / (EI * stretch) + RING_CURVATURE) / stretch
-        bent = stretch * rate - RING_CURVATURE
-        strain = -EI / EA * bent * rate / stretch
-        stretch = math.sqrt(1.0 + 2.0 * strain)
-    energy = 0.5 * STRIP_LENGTH * (EA * strain**2 + EI * bent**2)
-    angle = rate * STRIP_LENGTH
-    return energy, stretch / rate * math.sin(angle), stretch / rate * (1.0 - math.cos(angle))
+    """Energy (N mm) and tip x, z (mm) of the opened ring, exactly; see `shell_benchmarks.rolled_strip_exact`."""
+    return rolled_strip_exact(-OPENED * FULL_MOMENT, RING_CURVATURE)

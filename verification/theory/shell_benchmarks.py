@@ -94,30 +94,40 @@ def clamped_sheet(mesh: SheetMesh, sheet: Sheet) -> Model:
 
 def rolled_strip(along: int, steps: int = 3) -> tuple[Model, list[EdgeMoments]]:
     """The strip under an end moment, in steps of at most 120 degrees at the tip; cells of one shape at any `along`."""
-    model = clamped_sheet(rectangle(STRIP_LENGTH, 1.0, along, max(1, along // 12)), STRIP)
+    mesh = rectangle(STRIP_LENGTH, 1.0, along, max(1, along // 12))
+    return with_couple(clamped_sheet(mesh, STRIP), FULL_MOMENT, steps)
+
+
+def with_couple(model: Model, couple: float, steps: int) -> tuple[Model, list[EdgeMoments]]:
+    """A model with a couple a length, N, at "edge:end", put on in equal steps."""
     moments = []
     for step in range(steps):
         model = model.force("corner:low-end", each=(0.0, 0.0, 0.0))  # a step has to act in some way
-        ends = (FULL_MOMENT * step / steps, FULL_MOMENT * (step + 1) / steps)
+        ends = (couple * step / steps, couple * (step + 1) / steps)
         moments.append(EdgeMoments((("edge:end", *ends),)))
     return model, moments
 
 
-def rolled_strip_exact(moment: float = FULL_MOMENT) -> tuple[float, float, float]:
+def rolled_strip_exact(moment: float = FULL_MOMENT, rest: float = 0.0) -> tuple[float, float, float]:
     """Energy (N mm) and tip x, z (mm) of the strip under an end moment, exactly.
 
     That is for energies quadratic in Green's strain and in the second fundamental form.
-    With stretch s and rotation a length r the form is s r. Stationary energy: E A e s + E I s r^2 = 0 with
-    e = (s^2 - 1) / 2, hence e = -(t^2 / 12) r^2, and s^2 E I r = M. The strip shortens by t^2 r^2 / 12, 2e-4 here: the
-    error of any theory that takes the sheet as thin.
+    With stretch s, rotation a length r and the curvature k at rest the form is s r - k. Stationary energy:
+    E A e s + E I (s r - k) r = 0 with e = (s^2 - 1) / 2, and E I (s r - k) s = M. A strip that is flat at rest shortens
+    by t^2 r^2 / 12, 2e-4 here: the error of any theory that takes the sheet as thin.
+
+    Args:
+        moment: couple a length, N.
+        rest: curvature of the strip at rest, 1/mm.
     """
     EI, EA, length = STRIP.E * STRIP.t**3 / 12.0, STRIP.E * STRIP.t, STRIP_LENGTH
-    rate = moment / EI
+    stretch = 1.0
     for _ in range(50):
-        strain = -EI / EA * rate**2
-        rate = moment / (EI * (1.0 + 2.0 * strain))
-    stretch = math.sqrt(1.0 + 2.0 * strain)
-    energy = 0.5 * length * (EA * strain**2 + EI * (stretch * rate) ** 2)
+        rate = (moment / (EI * stretch) + rest) / stretch
+        bent = stretch * rate - rest
+        strain = -EI / EA * bent * rate / stretch
+        stretch = math.sqrt(1.0 + 2.0 * strain)
+    energy = 0.5 * length * (EA * strain**2 + EI * bent**2)
     angle = rate * length
     return energy, stretch / rate * math.sin(angle), stretch / rate * (1.0 - math.cos(angle))
 

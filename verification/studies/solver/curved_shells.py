@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from fem.kirchhoff_love import follow, linear_response
 from verification.framework.checks import CaseResult, Context, Cost, line, plot
+from verification.studies.solver.rolled_strips import Rolled, RolledStrip, cost_of
 from verification.theory import curved_shells as curved
-from verification.theory.shell_benchmarks import STRIP_LENGTH
 from verification.theory.solid_hook import solid_hook
 
 Array = NDArray[np.float64]
@@ -60,65 +60,15 @@ def run(context: Context) -> CaseResult:
 
 
 def _opened_ring(result: CaseResult, context: Context) -> None:
-    energy, x, z = curved.opened_ring_exact()
-    sizes, errors = [], []
-    for along in (12, 24) if context.quick else (12, 24, 48):
-        context.tell(f"curved_shells: ring opened by a couple, {along} cells")
+    def solve(along: int) -> Rolled:
         benchmark, moments = curved.opened_ring(along)
         began = time.perf_counter()
         states, increments = follow(benchmark.model, moments, shell=benchmark.shell)
-        last = increments[-1]
-        cost = Cost(
-            unknowns=len(last.point.q),
-            iterations=sum(increment.iterations for increment in increments),
-            wall_time_s=time.perf_counter() - began,
-            outcome=last.outcome,
-        )
-        tip = states[-1].points[list(benchmark.at)].mean(axis=0)
-        params = {"benchmark": "opened ring", "along": along}
-        tolerance = 5e-4 if along >= 24 else None
-        result.check(
-            "energy",
-            states[-1].energy.total,
-            unit="N mm",
-            reference=energy,
-            source="closed form",
-            tolerance=tolerance,
-            params=params,
-            path=cost,
-        )
-        result.check(
-            "distance of the tip from its place",
-            math.hypot(tip[0] - x, tip[2] - z) / STRIP_LENGTH,
-            unit="length",
-            reference=0.0,
-            source="closed form",
-            tolerance=tolerance,
-            params=params,
-            path=cost,
-        )
-        sizes.append(STRIP_LENGTH / along)
-        errors.append(abs(states[-1].energy.total / energy - 1.0))
-    result.check(
-        "order of convergence of the energy",
-        math.log2(errors[-2] / errors[-1]),
-        unit="1",
-        reference=4.0,
-        source="quadratic positions, linear moments",
-        tolerance=0.15,
-        params={"benchmark": "opened ring"},
-    )
-    result.plots.append(
-        plot(
-            "curved-opened-ring",
-            "Ring opened by a couple",
-            "mesh size",
-            "error of the energy",
-            [line("shell", sizes, errors, "points")],
-            "Relative error against the closed form.",
-            log="xy",
-        )
-    )
+        cost = cost_of(increments, time.perf_counter() - began)
+        return states[-1].energy.total, states[-1].points[list(benchmark.at)], cost
+
+    study = RolledStrip("opened ring", "ring opened by a couple", "closed form", "curved-opened-ring")
+    study.run(result, context, solve, curved.opened_ring_exact())
 
 
 def _hemispheres(result: CaseResult, context: Context) -> Iterator[Series]:
@@ -145,12 +95,7 @@ def _pinched_far(result: CaseResult, context: Context) -> None:
     benchmark = curved.open_hemisphere(cells, *curved.PINCH_TABLE)
     began = time.perf_counter()
     states, increments = follow(benchmark.model, shell=benchmark.shell)
-    cost = Cost(
-        unknowns=len(increments[-1].point.q),
-        iterations=sum(increment.iterations for increment in increments),
-        wall_time_s=time.perf_counter() - began,
-        outcome=increments[-1].outcome,
-    )
+    cost = cost_of(increments, time.perf_counter() - began)
     for step, (share, published) in enumerate(curved.PINCH_TABLE.items()):
         state = next((s for s in states if s.step == step and s.lam == 1.0), None)
         for axis, (name, value) in enumerate(zip(("out", "in"), published, strict=True)):

@@ -8,12 +8,12 @@ import numpy as np
 import skfem
 
 from bh.model.model import Model
-from bh.solvers.points import Increment
 from fem.kirchhoff_love import follow
 from fem.loads import EdgeMoments
 from fem.plate import Plate, hhj, morley
 from fem.state import ShellState
-from verification.framework.checks import CaseResult, Context, Cost, line, plot
+from verification.framework.checks import CaseResult, Context, Cost
+from verification.studies.solver.rolled_strips import Rolled, RolledStrip, cost_of
 from verification.theory import shell_benchmarks as sze
 
 PAPER = "Sze, Liu and Lo (2004)"
@@ -45,72 +45,19 @@ def run(context: Context) -> CaseResult:
 def _solve(model: Model, moments: list[EdgeMoments] | None = None) -> tuple[list[ShellState], Cost]:
     began = time.perf_counter()
     states, increments = follow(model, moments or ())
-    return states, _cost(increments, time.perf_counter() - began)
-
-
-def _cost(increments: list[Increment], seconds: float) -> Cost:
-    return Cost(
-        unknowns=len(increments[-1].point.q),
-        iterations=sum(increment.iterations for increment in increments),
-        wall_time_s=seconds,
-        outcome=increments[-1].outcome,
-    )
+    return states, cost_of(increments, time.perf_counter() - began)
 
 
 def _rolled_strip(result: CaseResult, context: Context) -> None:
-    energy, x, z = sze.rolled_strip_exact()
-    sizes, errors = [], []
-    for along in (12, 24) if context.quick else (12, 24, 48):
-        context.tell(f"shell_benchmarks: strip rolled to a circle, {along} cells")
+    def solve(along: int) -> Rolled:
         model, moments = sze.rolled_strip(along)
         states, cost = _solve(model, moments)
-        tip = states[-1].points[model.mesh.nodes("edge:end")].mean(axis=0)
-        params = {"benchmark": "rolled strip", "along": along}
-        fine = along >= 24
-        result.check(
-            "energy",
-            states[-1].energy.total,
-            unit="N mm",
-            reference=energy,
-            source="closed form (see notes)",
-            tolerance=5e-4 if fine else None,
-            params=params,
-            path=cost,
-        )
-        off = float(np.hypot(tip[0] - x, tip[2] - z))
-        result.check(
-            "distance of the tip from its place",
-            off / sze.STRIP_LENGTH,
-            unit="length",
-            reference=0.0,
-            source="closed form (see notes)",
-            tolerance=5e-4 if fine else None,
-            params=params,
-            path=cost,
-        )
-        sizes.append(sze.STRIP_LENGTH / along)
-        errors.append(abs(states[-1].energy.total / energy - 1.0))
-    rate = float(np.log(errors[-2] / errors[-1]) / np.log(sizes[-2] / sizes[-1]))
-    result.check(
-        "order of convergence of the energy",
-        rate,
-        unit="1",
-        reference=4.0,
-        source="quadratic positions, linear moments",
-        tolerance=0.15,
-        params={"benchmark": "rolled strip"},
+        return states[-1].energy.total, states[-1].points[model.mesh.nodes("edge:end")], cost
+
+    study = RolledStrip(
+        "rolled strip", "strip rolled to a circle", "closed form (see notes)", "shell-rolled-strip"
     )
-    result.plots.append(
-        plot(
-            "shell-rolled-strip",
-            "Strip rolled to a circle",
-            "mesh size",
-            "error of the energy",
-            [line("shell", sizes, errors, "points")],
-            "Relative error against the closed form.",
-            log="xy",
-        )
-    )
+    study.run(result, context, solve, sze.rolled_strip_exact())
 
 
 def _sheared_strip(result: CaseResult, context: Context) -> None:
